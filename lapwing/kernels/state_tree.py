@@ -178,6 +178,10 @@ axpy = _operation(
     "Return y + a v number by number for a scalar a; y is a tangent, or a state with embedded derivative v.",
 )  # fmt: skip
 scale = _operation("scale(a, v)", "v", _of_numbers(("v",), "a * {0}"), "Return a v for a scalar a and a tangent v.")
+rounding_error = _operation(
+    "rounding_error(x, v, s)", "x", _of_numbers(("x", "v", "s"), "({0} - ({2} - ({2} - {0}))) + ({1} - ({2} - {0}))"),
+    "Return the error x + v - s of the rounded sum s of two trees, exactly (theory.md, eq. (2.79)).",
+)  # fmt: skip
 flatten = _operation("flatten(x)", "x", _flatten, "Return every stored number of a state or tangent as one flat tuple.")
 largest = _operation("largest(v)", "v", _largest, "Return the largest absolute number of a state or tangent.")
 error_ratio = _operation(

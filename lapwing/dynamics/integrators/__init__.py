@@ -5,7 +5,8 @@ A method file has `ORDER`, `ON_MANIFOLD` (True if a step keeps manifold leaves o
 `rate(p, t, x)` returns the tangent of the state tree x (see lapwing/kernels/state_tree.py) for parameters p.
 
 Optional: `EVALUATIONS`, the number of rate evaluations of a step if it is fixed; `FLAT_ORDER`, the order without
-curvature if it is higher; `incompatibility(p, x)` of a method that does not support every system.
+curvature if it is higher; `increment`, the change of the numbers of x in a step before the projection onto the
+manifold; `incompatibility(p, x)` of a method that does not support every system.
 """
 
 from types import ModuleType
@@ -13,6 +14,15 @@ from typing import Any
 
 from lapwing.dynamics import discovery
 from lapwing.dynamics.integrators._adaptive import integrate_adaptive
+from lapwing.dynamics.integrators._compensated import (
+    CompensatedSum,
+    CompensatedSummation,
+    add,
+    exact,
+    extrapolate,
+    rounded,
+    value_of,
+)
 from lapwing.dynamics.integrators._fixed_step import RATES, integrate_fixed, rate, record, step
 from lapwing.dynamics.integrators._pieces import BREAKPOINTS
 from lapwing.dynamics.integrators._solve import check_start, not_finite, simulate, solve
@@ -22,9 +32,14 @@ __all__ = [
     "BREAKPOINTS",
     "RATES",
     "SHORTEST",
+    "CompensatedSum",
+    "CompensatedSummation",
     "StepDoubling",
+    "add",
     "check_start",
     "compatible_methods",
+    "exact",
+    "extrapolate",
     "get",
     "incompatibility",
     "integrate_adaptive",
@@ -34,10 +49,12 @@ __all__ = [
     "not_finite",
     "rate",
     "record",
+    "rounded",
     "shorter",
     "simulate",
     "solve",
     "step",
+    "value_of",
 ]
 
 

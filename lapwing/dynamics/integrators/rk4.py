@@ -2,7 +2,7 @@
 
 from lapwing.dynamics.integrators._fixed_step import method_token
 from lapwing.kernels import always_inline
-from lapwing.kernels.state_tree import axpy, embed
+from lapwing.kernels.state_tree import axpy, embed, scale
 
 ORDER = 4
 EVALUATIONS = 4
@@ -11,8 +11,8 @@ Method = method_token(__name__)
 
 
 @always_inline
-def step(rate, p, t, x, h):
-    """Take a step of the classical tableau on the stored numbers (theory.md, eq. (6.3))."""
+def increment(rate, p, t, x, h):
+    """Return what a step adds to the stored numbers: the classical tableau (theory.md, eq. (6.3))."""
     half = 0.5 * h
     k1 = embed(x, rate(p, t, x))
     x2 = axpy(half, k1, x)
@@ -21,4 +21,10 @@ def step(rate, p, t, x, h):
     k3 = embed(x3, rate(p, t + half, x3))
     x4 = axpy(h, k3, x)
     k4 = embed(x4, rate(p, t + h, x4))
-    return axpy(h / 6.0, axpy(2.0, axpy(1.0, k2, k3), axpy(1.0, k1, k4)), x)
+    return scale(h / 6.0, axpy(2.0, axpy(1.0, k2, k3), axpy(1.0, k1, k4)))
+
+
+@always_inline
+def step(rate, p, t, x, h):
+    """Take a step of the classical tableau on the stored numbers."""
+    return axpy(1.0, increment(rate, p, t, x, h), x)

@@ -9,6 +9,7 @@ ORDER = 4
 EVALUATIONS = 4
 ON_MANIFOLD = True
 Method = method_token(__name__)
+increment = rk4.increment
 
 
 @always_inline

@@ -5,7 +5,7 @@ For errors near round-off. Tableau: Hairer, Norsett, Wanner, Solving Ordinary Di
 
 from lapwing.dynamics.integrators._fixed_step import method_token
 from lapwing.kernels import always_inline
-from lapwing.kernels.state_tree import axpy, embed, normalise
+from lapwing.kernels.state_tree import axpy, embed, normalise, scale
 
 ORDER = 8
 EVALUATIONS = 12
@@ -19,8 +19,8 @@ def _slope(rate, p, t, x):
 
 
 @always_inline
-def step(rate, p, t, x, h):
-    """Take a step of twelve stages; the projection preserves the order (theory.md, eq. (6.4))."""
+def _slopes(rate, p, t, x, h):
+    """Return the slopes with a weight of the twelve stages."""
     k1 = _slope(rate, p, t, x)
     y = axpy(0.05260015195876773 * h, k1, x)
     k2 = _slope(rate, p, t + 0.05260015195876773 * h, y)
@@ -82,13 +82,30 @@ def step(rate, p, t, x, h):
     y = axpy(-8.87285693353063 * h, k9, y)
     y = axpy(12.360567175794303 * h, k10, y)
     y = axpy(0.6433927460157636 * h, k11, y)
-    k12 = _slope(rate, p, t + h, y)
-    y = axpy(0.054293734116568765 * h, k1, x)
+    return k1, k6, k7, k8, k9, k10, k11, _slope(rate, p, t + h, y)
+
+
+@always_inline
+def _add(slopes, h, y):
+    k1, k6, k7, k8, k9, k10, k11, k12 = slopes
+    y = axpy(0.054293734116568765 * h, k1, y)
     y = axpy(4.450312892752409 * h, k6, y)
     y = axpy(1.8915178993145003 * h, k7, y)
     y = axpy(-5.801203960010585 * h, k8, y)
     y = axpy(0.3111643669578199 * h, k9, y)
     y = axpy(-0.1521609496625161 * h, k10, y)
     y = axpy(0.20136540080403034 * h, k11, y)
-    y = axpy(0.04471061572777259 * h, k12, y)
-    return normalise(y)
+    return axpy(0.04471061572777259 * h, k12, y)
+
+
+@always_inline
+def increment(rate, p, t, x, h):
+    """Return what a step adds to the stored numbers."""
+    slopes = _slopes(rate, p, t, x, h)
+    return _add(slopes, h, scale(0.0, slopes[0]))
+
+
+@always_inline
+def step(rate, p, t, x, h):
+    """Take a step; the projection preserves the order (theory.md, eq. (6.4))."""
+    return normalise(_add(_slopes(rate, p, t, x, h), h, x))

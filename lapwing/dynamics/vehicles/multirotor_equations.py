@@ -20,12 +20,14 @@ from lapwing.dynamics.effects._types import (
     PerRotor,
     Rotors,
 )
+from lapwing.dynamics.integrators import CompensatedSummation
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import ZERO, Vec3, product
 from lapwing.dynamics.vehicles.newton_euler import newton_euler
 from lapwing.kernels import DispatchTable, always_inline
 from lapwing.kernels.codegen import generic, map_tuple
 
+PLAIN_TOLERANCE = 1e-13  # below it, the error of plain sums of the parts of a step can exceed the accuracy
 STANDARD_DENSITY = 1.225  # [kg/m^3] default without an effect: 15 degC, 1 atm
 
 
@@ -53,6 +55,12 @@ class MultirotorParameters(NamedTuple):
     layout: RotorLayout
     effects: tuple  # parameter NamedTuples of the active effects, sorted by name
     tolerance: float  # error of a substep while the vehicle is in contact, relative to 1 + size
+    summation: tuple = ()  # CompensatedSummation() to compensate the sums of these substeps; see `with_tolerance`
+
+
+def with_tolerance(p: MultirotorParameters, tolerance: float) -> MultirotorParameters:
+    """Return parameters with another tolerance of substeps in contact, and the summation that it requires."""
+    return p._replace(tolerance=tolerance, summation=() if tolerance >= PLAIN_TOLERANCE else CompensatedSummation())
 
 
 class MultirotorState(NamedTuple):

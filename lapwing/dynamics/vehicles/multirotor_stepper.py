@@ -5,7 +5,7 @@ import sys
 from typing import Any, NamedTuple
 
 from lapwing.dynamics.effects import _hooks as hooks
-from lapwing.dynamics.integrators import SHORTEST
+from lapwing.dynamics.integrators import SHORTEST, CompensatedSum, add, exact, extrapolate, rounded, value_of
 from lapwing.dynamics.vehicles.multirotor_equations import (
     FORMS,
     MultirotorDrive,
@@ -19,7 +19,7 @@ from lapwing.dynamics.vehicles.multirotor_equations import (
 from lapwing.kernels import always_inline, kernel
 from lapwing.kernels import noinline as never_inlined
 from lapwing.kernels.codegen import generic, map_tuple
-from lapwing.kernels.state_tree import axpy, finite, normalise, relative_difference
+from lapwing.kernels.state_tree import finite, relative_difference
 
 BREAK_ROUNDING = 1e-6  # relative to a communication step: breakpoints this close to its ends count as the ends
 FASTEST_LAG = 1.0  # largest product of lag rate and step without substeps: every explicit method is stable up to 2
@@ -27,11 +27,23 @@ FASTEST_LAG = 1.0  # largest product of lag rate and step without substeps: ever
 
 @generic(inline=True)
 def _step(method, drive, t, x, h):
-    one_step = sys.modules[method.instance_class.__module__].step
-    form = FORMS[x.instance_class]
+    module = sys.modules[method.instance_class.__module__]
+    if x.instance_class is CompensatedSum:
+        return _compensated_step(module.increment, FORMS[x.types[0].instance_class])
+    one_step, form = module.step, FORMS[x.instance_class]
     its_rate, project = form.rate, form.project
     # inlined into `advance`, so that constants of an interval are computed once
     return lambda method, drive, t, x, h: project(drive, one_step(its_rate, drive, t, x, h))
+
+
+def _compensated_step(increment, form):
+    its_rate, project = form.rate, form.project
+
+    def step(method, drive, t, x, h):
+        value, remainder = add(x, increment(its_rate, drive, t, x.value, h))
+        return CompensatedSum(project(drive, value), remainder)
+
+    return step
 
 
 @generic(inline=True)
@@ -57,7 +69,9 @@ def _airborne(p, body, memory, voltage):
     """Return the drive without the effects that can sleep."""
     effects = hooks.without_sleepers(p.effects, p.effects)
     awake = hooks.without_sleepers(p.effects, memory)
-    return MultirotorDrive(MultirotorParameters(p.body, p.layout, effects, p.tolerance), body, awake, voltage)
+    return MultirotorDrive(
+        MultirotorParameters(p.body, p.layout, effects, p.tolerance, p.summation), body, awake, voltage
+    )
 
 
 class AwakeState(NamedTuple):
@@ -93,7 +107,7 @@ def _with_memories(drive, x):
 def _awake_rate(drive, t, x):
     p, body, memory, voltage = _with_memories(drive, x)
     effects, rates = hooks.with_rates(p.effects, memory, motion_of(p.layout, x.motion))
-    parameters = MultirotorParameters(p.body, p.layout, effects, p.tolerance)
+    parameters = MultirotorParameters(p.body, p.layout, effects, p.tolerance, p.summation)
     return AwakeState(_rate_of_form(MultirotorDrive(parameters, body, memory, voltage), t, x.motion), rates)
 
 
@@ -110,16 +124,16 @@ def _awake_accelerations(drive, t, x):
 FORMS[AwakeState] = StateForm(_wake, _awake_rate, _project_awake, _awake_accelerations)
 
 
-@generic(inline=True)
-def _extrapolate(method, halves, whole):
-    share = 1.0 / (2.0 ** sys.modules[method.instance_class.__module__].ORDER - 1.0)
-    return lambda method, halves, whole: normalise(axpy(share, axpy(-1.0, whole, halves), halves))
-
-
 @always_inline
 def _growth(error, allowed):
     """Return the length of the next substep over that of the last (theory.md, eq. (2.33))."""
     return min(max(0.9 * math.sqrt(math.sqrt(allowed / max(error, 1e-3 * allowed))), 0.1), 2.0)
+
+
+@generic(inline=True)
+def _origin(x, t):
+    """Return the moment from which time is counted, so that its sum does not round off: t for compensated sums."""
+    return (lambda x, t: t) if x.instance_class is CompensatedSum else (lambda x, t: 0.0)
 
 
 @never_inlined
@@ -127,32 +141,36 @@ def _stiff_steps(method, drive, t, x, h, end):
     """Return (motion, memory) at the time `end` by step doubling (theory.md, eq. (2.33)).
 
     Each substep is taken whole and in halves, with the effects' memories that have a rate; the difference is the error.
-    The result of the halves is kept; they are no longer than h and than effects require.
+    The result of the halves is kept; they are no longer than h and than effects require. Compensated sums include the
+    time, which is that from the first step.
     """
     p, memory = drive.parameters, drive.memory
     allowed, part = p.tolerance, 2.0 * h
     smallest = SHORTEST * allowed
-    x = AwakeState(x, hooks.all_integrated(p.effects, memory))
+    x = exact(p.summation, method, AwakeState(x, hooks.all_integrated(p.effects, memory)))
+    origin = _origin(x, t)
+    t, end = t - origin, end - origin
     while True:
         left = end - t
-        part = min(part, 2.0 * h / hooks.all_substeps(p.effects, memory, motion_of(p.layout, x), h))
+        part = min(part, 2.0 * h / hooks.all_substeps(p.effects, memory, motion_of(p.layout, value_of(x)), h))
         last = part > (1.0 - 1e-9) * left
         size = left if last else part
         half = 0.5 * size
-        y, whole, start, length = x, x, t, size
+        y, whole, start, length = x, x, origin + t, size
         for k in range(3):  # one call site: passing arguments at three took 1/6 of the time
             y = _step(method, drive, start, y, length)
             if k == 0:
                 y, whole, length = x, y, half
             else:
-                start = t + half
+                start = origin + (t + half)
         sound = finite(y)
-        error = relative_difference(y, whole) if sound else math.inf
+        error = relative_difference(value_of(y), value_of(whole)) if sound else math.inf
         part = size * _growth(error, allowed)
         if size > smallest and error > allowed:
             continue
-        x = _extrapolate(method, y, whole)
+        x = extrapolate(method, y, whole)
         if last or not sound:
+            x = rounded(x)
             return x.motion, hooks.with_integrated(p.effects, memory, x.memory)
         t += size
 

@@ -9,7 +9,7 @@ import numpy as np
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.noise import Key, stream_key
 from lapwing.dynamics.vehicles import multirotor
-from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
+from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, with_tolerance
 from lapwing.kernels import kernel
 from lapwing.kernels.cell import Cell
 from lapwing.services.common.vehicle_schema import active, airframe, rotor_constants, start_height
@@ -53,7 +53,7 @@ def costs(scene: Scene, variants: list[Tables]) -> list[Cost]:
 
 def _calls(scene: Scene) -> tuple[Any, Any]:
     frame = airframe(scene)
-    p = multirotor.parameters(frame, active(scene))._replace(tolerance=scene[Solver].contact_tolerance)
+    p = with_tolerance(multirotor.parameters(frame, active(scene)), scene[Solver].contact_tolerance)
     rotor = rotor_constants(scene)
     lift = (STANDARD_DENSITY if rotor.with_density else 1.0) * rotor.thrust
     speed = math.sqrt(frame.mass.total * STANDARD_GRAVITY / (len(frame.rotors.position) * lift))

@@ -14,6 +14,7 @@ from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.noise import Key, stream_key
 from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles.ground_equilibrium import static_equilibrium
+from lapwing.dynamics.vehicles.multirotor_equations import with_tolerance
 from lapwing.services.common import effect_inputs, ports
 from lapwing.services.common.communication_schema import Communication, Rates, ticks
 from lapwing.services.common.ports import BatteryReading, BodyMotions, TrueState
@@ -108,7 +109,7 @@ def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceConfig:
     solver, steps, step = method(scene)
     key = noise_key(scene[Run].seed, scene[Vehicle].name)
     settle = round(scene[Run].stop_delay * exchange.rate)
-    p = p._replace(tolerance=scene[Solver].contact_tolerance)
+    p = with_tolerance(p, scene[Solver].contact_tolerance)
     core = MultirotorPlant(solver, p, key, step, steps, exchange.interval, zero, settle)
     start = MultirotorPlantState(static_equilibrium(form, p, start_pose(scene), gravity(scene)), last_tick(scene))
     truth = TrueState(

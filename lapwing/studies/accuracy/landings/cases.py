@@ -18,7 +18,12 @@ from lapwing.dynamics.terrain import relief
 from lapwing.dynamics.vector import Vec3, add, scale
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import Airframe, load_airframe
-from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, MultirotorParameters, MultirotorState
+from lapwing.dynamics.vehicles.multirotor_equations import (
+    STANDARD_DENSITY,
+    MultirotorParameters,
+    MultirotorState,
+    with_tolerance,
+)
 from lapwing.kernels.state_tree import flatten
 from lapwing.services.plant.schema import contact_tolerance
 from lapwing.studies.accuracy.coordinates import coordinates, of_state
@@ -205,7 +210,7 @@ def fly(case: Landing, accuracy: float, integrator: str = "rk4_renormalised") ->
     p, state = plant(case)
     n = airborne_steps(accuracy, integrator)  # compiles or loads, too
     started = time.perf_counter()
-    rows = _rows(integrator, p._replace(tolerance=contact_tolerance(accuracy)), state, n)
+    rows = _rows(integrator, with_tolerance(p, contact_tolerance(accuracy)), state, n)
     return rows, time.perf_counter() - started
 
 
@@ -215,7 +220,7 @@ def round_off(case: Landing, integrator: str = "rk4_renormalised") -> float:
     It is a sample, not a bound: a landing amplifies an initial difference by up to 3e5.
     """
     p, state = plant(case)
-    p, n = p._replace(tolerance=contact_tolerance(ACCURACIES[-1])), airborne_steps(ACCURACIES[-1], integrator)
+    p, n = with_tolerance(p, contact_tolerance(ACCURACIES[-1])), airborne_steps(ACCURACIES[-1], integrator)
     first, *others = (
         _rows(integrator, p, state._replace(motion=state.motion._replace(velocity_world=velocity)), n)
         for velocity in _last_bits(state.motion.velocity_world)

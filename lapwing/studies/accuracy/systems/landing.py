@@ -8,6 +8,7 @@ import numpy as np
 
 from lapwing.dynamics import integrators
 from lapwing.dynamics.vehicles import multirotor
+from lapwing.dynamics.vehicles.multirotor_equations import with_tolerance
 from lapwing.kernels.state_tree import flatten
 from lapwing.services.plant.schema import contact_tolerance
 from lapwing.studies.accuracy.coordinates import coordinates, defect
@@ -54,7 +55,7 @@ def _solver_method(name: str, case: Landing) -> SolverMethod:
 
     def prepare(accuracy: float, rows: int = SAMPLES + 1) -> Callable[[], Any]:
         p, start = cases.plant(case)
-        p, off = p._replace(tolerance=contact_tolerance(accuracy)), (0.0,) * len(p.layout.x_body)
+        p, off = with_tolerance(p, contact_tolerance(accuracy)), (0.0,) * len(p.layout.x_body)
         steps = round(cases.INTERVAL / STEP)
 
         def fly() -> tuple[np.ndarray, np.ndarray]:

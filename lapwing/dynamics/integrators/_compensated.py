@@ -1,0 +1,67 @@
+"""Compensated summation: a state with the rounding errors of the sums that made it (theory.md, eq. (2.79)).
+
+Kahan, Comm. ACM 8 (1965) 40; Moeller, BIT 5 (1965) 37 and 251; for steps of an integrator Hairer, Lubich, Wanner,
+Geometric Numerical Integration, section VIII.5.
+"""
+
+import sys
+from typing import Any, NamedTuple
+
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import generic
+from lapwing.kernels.state_tree import axpy, normalise, rounding_error, scale
+
+
+class CompensatedSummation(NamedTuple):
+    """Choice of compensated sums, by its class: kernels without it do not contain them."""
+
+
+class CompensatedSum(NamedTuple):
+    """A state whose numbers are sums of two doubles."""
+
+    value: Any  # tree of numbers
+    remainder: Any  # of the same shape, at most half a unit in the last place of the value
+
+
+@generic(inline=True)
+def exact(summation, method, x):
+    """Return the state x as a CompensatedSum if that is the choice and the method has increments; else x."""
+    chosen = getattr(summation, "instance_class", None) is CompensatedSummation
+    if chosen and hasattr(sys.modules[method.instance_class.__module__], "increment"):
+        return lambda summation, method, x: CompensatedSum(x, scale(0.0, x))
+    return lambda summation, method, x: x
+
+
+@always_inline
+def add(x, v):
+    """Return the CompensatedSum x + v for a tree v of numbers."""
+    v = axpy(1.0, x.remainder, v)
+    value = axpy(1.0, v, x.value)
+    return CompensatedSum(value, rounding_error(x.value, v, value))
+
+
+@always_inline
+def difference(x, y):
+    """Return the tree x - y of two CompensatedSums that are close to one another."""
+    return axpy(1.0, axpy(-1.0, y.remainder, x.remainder), axpy(-1.0, y.value, x.value))
+
+
+@generic(inline=True)
+def value_of(x):
+    """Return the value of a CompensatedSum; any other tree itself."""
+    return (lambda x: x.value) if x.instance_class is CompensatedSum else (lambda x: x)
+
+
+@generic(inline=True)
+def rounded(x):
+    """Return the state on the manifold that a CompensatedSum is nearest to; any other tree itself."""
+    return (lambda x: normalise(x.value)) if x.instance_class is CompensatedSum else (lambda x: x)
+
+
+@generic(inline=True)
+def extrapolate(method, halves, whole):
+    """Return the result of two half steps without the leading term of its error (theory.md, eq. (2.33))."""
+    share = 1.0 / (2.0 ** sys.modules[method.instance_class.__module__].ORDER - 1.0)
+    if halves.instance_class is CompensatedSum:
+        return lambda method, halves, whole: add(halves, scale(share, difference(halves, whole)))
+    return lambda method, halves, whole: normalise(axpy(share, axpy(-1.0, whole, halves), halves))
