@@ -71,7 +71,7 @@ def page() -> Target:
     """Requests to the page of `lapwing run --view`: what its guard makes of a path and headers."""
     guard = Guard("token", None)
     guard.hosts = {"127.0.0.1:8000"}
-    guard.answer = lambda connection, request: None
+    guard.handler = lambda connection, request: None
     connection = SimpleNamespace(respond=lambda status, text: None)
 
     def read(data: bytes) -> None:

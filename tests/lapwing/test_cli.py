@@ -28,7 +28,7 @@ BAD = {
         "communication.rate: expected a whole number above 0 and",
     ),
     "rates": ([HOVER, "--set", "rates.pose=33"], "expected a rate that divides communication.rate"),
-    "step": ([HOVER, "--set", "solver.step=0.003"], "expected a step that divides the exchange interval"),
+    "step": ([HOVER, "--set", "solver.step=0.003"], "expected a step that divides the communication step"),
     "integrator": ([HOVER, "--set", "solver.integrator=rk5"], "unknown integrator 'rk5'; did you mean rk"),
     "effect": ([HOVER, "--set", "effects.gravty={}"], "effects.gravty: unknown effect 'gravty'; did you"),
     "own effect": ([HOVER, "--set", "effects.gravty={}"], 'an effect of your own needs `module = "FILE"`'),

@@ -67,8 +67,8 @@ def known(setup, services):
             commander.phases.number(text)
         phases, words = commander.phases.table, commander.status_texts.table
     if link := next((p for s in services for p in s.parts if hasattr(p, "reports")), None):  # of a foreign firmware
-        link.words.table += WORDS
-        phases, words = phases or ("",), link.words.table
+        link.status_texts.table += WORDS
+        phases, words = phases or ("",), link.status_texts.table
     wiring = values["plant"].wiring
     sensors = [instrument.sensor for instrument in values["sensors"].instruments] if "sensors" in values else []
     return SimpleNamespace(
