@@ -138,7 +138,8 @@ def test_accuracy_of_recorded_commands_is_measured(tmp_path, monkeypatch, accura
     fly_single(resolve(load("betaflight_quad", QUAD)), log)
     result = lapwing_check(tmp_path, log, "--json", "a.json", "--set", f"solver.accuracy={accuracy}")
     assert result.returncode == code, result.stdout + result.stderr
-    assert f"accuracy of the solver {'missed' if code else 'met'}: asked {accuracy:g}" in result.stdout
+    assert f"accuracy of the solver {'missed' if code else 'met'}: error " in result.stdout
+    assert f"required {accuracy:g}" in result.stdout
     assert "against steps of 0.125 ms" in result.stdout
     errors = {q["name"]: q["error"] for q in json.loads((tmp_path / "a.json").read_text())["quantities"]}
     assert 1e-12 < max(errors.values()) < 1e-6
