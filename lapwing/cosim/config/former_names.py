@@ -37,6 +37,7 @@ def present_name(name: str) -> str:
 def present_fields(class_path: str, members: Mapping[str, Any]) -> dict[str, Any]:
     """Return the members of a recorded object of the present "module:Class" by the present names of its fields."""
     renamed, added = (former_names()[kind].get(class_path, {}) for kind in ("fields", "added"))
+    added = {key: tuple(value) if isinstance(value, list) else value for key, value in added.items()}
     present = added | {renamed.get(key, key): value for key, value in members.items()}
     if class_path.endswith(":GroundContact") and (square := present.pop("square_stiction_velocity", None)):
         # an anchor with a flag became friction elements
