@@ -43,7 +43,7 @@ def fly(program, tmp_path, log, *more):
     own = subprocess.Popen([program, layout, endpoint, "test-rust"])
     try:
         where = ["--external", f"autopilot={endpoint}", "--insecure", "--key-prefix", "test-rust", "--log", str(log)]
-        return lapwing("run", SCENE, *SHORT, *where, "--json", str(log.with_suffix(".json")), *more), own.wait(10)
+        return lapwing("run", SCENE, *SHORT, *where, "--json", str(log.with_suffix(".json")), *more), own.wait(120)
     finally:
         own.kill()
 

@@ -62,7 +62,7 @@ def test_report_of_modelled_battery_has_its_margin(folder):
         assert "energy drawn [W h]" in text
         assert "% of the charge is left" in text
         assert "above 15 % (warning)" in text
-    assert "the scene models no battery" in page_text(folder / "a.html")
+    assert "the scene has no battery model" in page_text(folder / "a.html")
 
 
 @needs_chromium

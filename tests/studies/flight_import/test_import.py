@@ -58,7 +58,7 @@ def broken(path, text):
     ("name", "content", "message"),
     [
         ("flight.ulg", b"no log", "is not a readable ULog file"),
-        ("flight.csv", b"a,b\n1,2\n", "no known column"),
+        ("flight.csv", b"a,b\n1,2\n", "none of the mapped columns"),
         ("flight.csv.gz", b"no gzip", "cannot be read"),
         ("flight.txt", b"1 2 3", "unknown format"),
     ],
