@@ -17,7 +17,7 @@ from scipy.optimize import least_squares
 from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.flight_import.rotation_arrays import continuous, unit
 from lapwing.studies.identification.flight_parameters import apply_flight_parameters, is_flight_parameter
-from lapwing.studies.identification.instrumental_variables import LOSS_SCALE, loss, moments
+from lapwing.studies.identification.instrumental_variables import LOSS_SCALE, Moments, loss, moments
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.start_states import NO_TRIM, TrimMemory, start_states
 from lapwing.studies.validation.windows import Errors, Span, compare, predict_all, window_starts
@@ -173,13 +173,15 @@ class OutputError:
         )  # fmt: skip
         return self._fit(solution.x, bounds / self.scale)
 
+    def _moments(self, x: np.ndarray) -> tuple[np.ndarray, Moments]:
+        """Return the residuals at x, and the moment equations with instruments."""
+        residual, derivatives = self.derivatives(x)
+        return residual, moments(residual, derivatives, self.derivatives(x, INSTRUMENT)[1], self.clusters())
+
     def _fit(self, x: np.ndarray, bounds: np.ndarray) -> Fit:
         """Return the fit at the minimum x, corrected for the noise of the starts, with standard errors."""
-        step = moments(*self.derivatives(x), self.derivatives(x, INSTRUMENT)[1], self.clusters()).step
-        x = np.clip(x + step, *bounds)
-        residual, derivatives = self.derivatives(x)
-        instruments = self.derivatives(x, INSTRUMENT)[1]
-        _, deviation, correlation = moments(residual, derivatives, instruments, self.clusters())
+        x = np.clip(x + self._moments(x)[1].step, *bounds)
+        residual, (_, deviation, correlation) = self._moments(x)
         vague = deviation > 0.5 * np.maximum(np.abs(x), 1e-2)
         mixed = np.abs(correlation - np.eye(len(x))).max(axis=1, initial=0.0) > 0.98
         return Fit(

@@ -122,7 +122,7 @@ def test_alias_leads_to_present_module_and_class(name):
         assert hasattr(sys.modules[module], path)
 
 
-def test_log_with_airspeed_error_is_read_with_equal_pressure_errors_of_all_directions():
+def test_airspeed_error_in_former_log_becomes_static_pressure_error():
     """A log of before: one share of the dynamic pressure, a field of the parameters and a key of the scene."""
     table = {"sensors": {"barometer": {"airspeed_error": 0.2}}}
     assert present_tables(table)["sensors"]["barometer"] == {"static_pressure_error": dict.fromkeys(DIRECTIONS, 0.2)}

@@ -29,8 +29,8 @@ def run(command, *options, timeout=900):
 @pytest.mark.long
 def test_scripted_firmware_flies_and_resimulates(tmp_path):
     log = tmp_path / "flight.mcap"
-    flights = run([sys.executable, str(PEER)], "--log", str(log), "--set", "run.duration=15.0")
-    assert "leaves the ground" in flights.stdout, flights.stdout + flights.stderr
+    result = run([sys.executable, str(PEER)], "--log", str(log), "--set", "run.duration=15.0")
+    assert "leaves the ground" in result.stdout, result.stdout + result.stderr
     with LogReader(log) as reader:
         report = reader.metadata["firmware"]
     assert "skew 0 ms, resent 0, late 0, missed 0, rejected 0, reconnected 0" in report
@@ -40,11 +40,11 @@ def test_scripted_firmware_flies_and_resimulates(tmp_path):
 
 @pytest.mark.long
 def test_program_end_in_flight_is_reported(tmp_path):
-    flights = run([sys.executable, str(PEER), "--die"], "--log", str(tmp_path / "flight.mcap"))
-    assert flights.returncode != 0
-    assert "ardupilot: the program ended (exit code 1) at t = 4.00" in flights.stderr
-    assert "crashed on purpose" in flights.stderr
-    assert "Traceback" not in flights.stderr
+    result = run([sys.executable, str(PEER), "--die"], "--log", str(tmp_path / "flight.mcap"))
+    assert result.returncode != 0
+    assert "ardupilot: the program ended (exit code 1) at t = 4.00" in result.stderr
+    assert "crashed on purpose" in result.stderr
+    assert "Traceback" not in result.stderr
 
 
 def test_slow_exchange_is_rejected():
@@ -67,8 +67,8 @@ def test_mission_is_part_of_configuration():
 @pytest.mark.skipif("LAPWING_ARDUCOPTER" not in os.environ, reason="LAPWING_ARDUCOPTER names no arducopter program")
 def test_arducopter_flies_its_square(tmp_path):
     log, binary = tmp_path / "flight.mcap", Path(os.environ["LAPWING_ARDUCOPTER"]).resolve()
-    flights = run([str(binary)], "--log", str(log))
-    assert flights.returncode == 0, flights.stdout + flights.stderr
-    assert "Landed" in flights.stdout
+    result = run([str(binary)], "--log", str(log))
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "Landed" in result.stdout
     with LogReader(log) as reader:
         assert "skew 0 ms" in reader.metadata["firmware"]

@@ -31,8 +31,8 @@ def run(command, *options, timeout=600):
 @pytest.mark.long
 def test_scripted_firmware_flies_and_resimulates(tmp_path):
     log = tmp_path / "flight.mcap"
-    flights = run([sys.executable, str(PEER)], "--log", str(log))
-    assert flights.returncode == 0, flights.stdout + flights.stderr
+    result = run([sys.executable, str(PEER)], "--log", str(log))
+    assert result.returncode == 0, result.stdout + result.stderr
     with LogReader(log) as reader:
         report = reader.metadata["firmware"]
     assert report.startswith("px4: ")
@@ -44,10 +44,10 @@ def test_scripted_firmware_flies_and_resimulates(tmp_path):
 @pytest.mark.long
 def test_stalled_firmware_is_reported_and_log_readable(tmp_path):
     log = tmp_path / "flight.mcap"
-    flights = run([sys.executable, str(PEER), "--stall"], "--log", str(log), "--set", "autopilot.step_timeout=2.0")
-    assert flights.returncode != 0
-    assert "px4: no HIL_ACTUATOR_CONTROLS for 2 s at t = " in flights.stderr
-    assert "Traceback" not in flights.stderr
+    result = run([sys.executable, str(PEER), "--stall"], "--log", str(log), "--set", "autopilot.step_timeout=2.0")
+    assert result.returncode != 0
+    assert "px4: no HIL_ACTUATOR_CONTROLS for 2 s at t = " in result.stderr
+    assert "Traceback" not in result.stderr
     with LogReader(log) as reader:
         times, _ = reader.history("/drone1/ground_truth")
     assert times[-1] > 2_000_000_000
@@ -56,20 +56,20 @@ def test_stalled_firmware_is_reported_and_log_readable(tmp_path):
 @pytest.mark.long
 def test_missing_program_is_reported(tmp_path):
     log = tmp_path / "flight.mcap"
-    flights = run(["/nowhere/px4"], "--log", str(log))
-    assert flights.returncode == 2
-    assert "autopilot.command: cannot start /nowhere/px4; expected path of a program" in flights.stderr
-    assert "Traceback" not in flights.stderr
+    result = run(["/nowhere/px4"], "--log", str(log))
+    assert result.returncode == 2
+    assert "autopilot.command: cannot start /nowhere/px4; expected path of a program" in result.stderr
+    assert "Traceback" not in result.stderr
     assert not log.exists()
 
 
 @pytest.mark.long
 def test_missing_working_directory_is_reported(tmp_path):
-    flights = run(
+    result = run(
         [sys.executable], "--set", f"autopilot.directory={tmp_path}/nowhere", "--log", str(tmp_path / "a.mcap")
     )
-    assert flights.returncode == 2
-    assert "autopilot.directory: no folder" in flights.stderr
+    assert result.returncode == 2
+    assert "autopilot.directory: no folder" in result.stderr
 
 
 def test_missing_sensor_is_rejected(tmp_path):
@@ -97,8 +97,8 @@ def test_px4_flies_its_square(tmp_path):
     command = [str(binary), "-d", str(binary.parents[1] / "etc")]
     environment = 'autopilot.environment={PX4_SIM_MODEL = "none_iris"}'
     links = "autopilot.instance=8"  # missions go to instances 0 to 9 only
-    flights = run(command, "--log", str(log), "--set", environment, "--set", links)
-    assert flights.returncode == 0, flights.stdout + flights.stderr
-    assert "Landed" in flights.stdout
+    result = run(command, "--log", str(log), "--set", environment, "--set", links)
+    assert result.returncode == 0, result.stdout + result.stderr
+    assert "Landed" in result.stdout
     with LogReader(log) as reader:
         assert "skew 0 ms" in reader.metadata["firmware"]

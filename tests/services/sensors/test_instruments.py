@@ -385,7 +385,7 @@ def test_delta_angles_of_coning_restore_attitude():
 
 @pytest.mark.long
 def test_integrated_readings_restore_velocity_at_imu():
-    """With rotation and acceleration: the sum of R_before f / rate - g t is the change of v + R (omega x r)."""
+    """The sum of R_before f / rate - g t is the change of v + R (omega x r), with rotation and acceleration."""
     rate, place = 100.0, (0.2, -0.1, 0.05)
     p, gained, before, path = imu.Imu(rate=rate, delta_output=True, position=place), np.zeros(3), None, []
     for k in range(60):

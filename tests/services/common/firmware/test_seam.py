@@ -125,8 +125,8 @@ def test_recorded_commands_fly_again_to_recorded_digest(tmp_path, monkeypatch):
     with LogReader(log) as read:
         assert read.metadata["firmware"].startswith("betaflight scripted: 501 steps, skew 0 ms")
         assert re.search(r"CPU [\d.]+ s of Lapwing and 250 s of the firmware", read.metadata["firmware"])
-        flights = read.digest()
-    assert resimulate(log) == (flights, flights)
+        recorded_digest = read.digest()
+    assert resimulate(log) == (recorded_digest, recorded_digest)
     assert Counted.opened == 1
 
 
