@@ -51,7 +51,7 @@ def show(landings: Collection[LandingErrors]) -> None:
     for landing, row in zip(landings, table, strict=True):
         if row.max() > 1.0:
             k = int(row.argmax())
-            missed = f"{row[k]:.2g} at {ACCURACIES[k]:.0e}, {landing.worst[k]:.3f} s"
+            missed = f"{row[k]:.2g} at {ACCURACIES[k]:.0e}, {landing.worst_time[k]:.3f} s"
             print(f"landing {landing.seed}: {missed}; round-off {landing.round_off:.2g}")
 
 

@@ -38,7 +38,7 @@ def table(title: str, points: list[Point]) -> None:
         ours = best([p for p in points if simulator(p) == "Lapwing"], level)
         if ours is None:
             continue
-        line = f"{level:6.0e} {ours.way + f' {1e3 * ours.time:.3g}':>24} "
+        line = f"{level:6.0e} {ours.method + f' {1e3 * ours.time:.3g}':>24} "
         for name in others:
             other = best([p for p in points if simulator(p) == name], level)
             if other is None:
@@ -82,7 +82,7 @@ def main() -> None:
         problem = problems()[case]
         points = measure(problem)
         for module in others:
-            points += measure(problem._replace(ways=module.ways(case), invariants={}), LONGEST)
+            points += measure(problem._replace(methods=module.ways(case), invariants={}), LONGEST)
         result[problem.title] = points
         table(f"{problem.title}, {problem.duration:g} {problem.unit}", points)
     draw(result)

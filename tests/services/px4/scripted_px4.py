@@ -80,11 +80,11 @@ def main():
     ground = height = rate = 0.0
     armed_at = None
     while message is not None:
-        for other in peer.passed:
+        for other in peer.skipped:
             if other.get_type() == "HIL_GPS":
                 ground = ground or other.alt * 1e-3
                 height, rate = other.alt * 1e-3 - ground, -other.vd * 1e-2
-        peer.passed.clear()
+        peer.skipped.clear()
         time_us = message.time_usec
         vehicle.poll(time_us % 200_000 == 0)
         peer.armed = vehicle.armed
