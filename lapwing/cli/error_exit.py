@@ -35,6 +35,10 @@ def user_errors() -> Iterator[None]:
         fail(f"{error.filename or 'system'}: {reason}", 1)
     except MemoryError:
         fail("system: not enough memory", 1)
+    except ImportError as error:
+        if "failed to map segment" not in str(error):  # ld.so has no room for a native library
+            raise
+        fail("system: not enough memory", 1)
     finally:
         release_claims()
 

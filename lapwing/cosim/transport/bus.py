@@ -9,10 +9,12 @@ import queue
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from types import MappingProxyType
 from typing import Any
+
+import zenoh
 
 from lapwing.cosim.run_errors import BusError
 from lapwing.cosim.transport.ring_subscription import Inbox
@@ -22,9 +24,6 @@ from lapwing.messages.attachment import pack, time_and_gid
 
 # One runtime thread instead of six: the largest single gain in latency (see docs/reference/benchmarks.md).
 _RUNTIME = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:app),app:(worker_threads:1))"
-os.environ.setdefault("ZENOH_RUNTIME", _RUNTIME)
-
-import zenoh  # noqa: E402  (reads ZENOH_RUNTIME when the first session opens)
 
 INBOX = 4096  # [messages] far more than arrive in lock step before one is read
 WAKE = 0.05  # [s] between two checks of the deadlines of waiting threads
@@ -70,7 +69,9 @@ class ZenohBus:
         _opened = True
         listen, connect = list(listen), list(connect)
         try:
-            self._session = zenoh.open(_zenoh_config({**session_settings(listen, connect, mode, awaits), **security}))
+            with _one_runtime_thread():
+                settings = {**session_settings(listen, connect, mode, awaits), **security}
+                self._session = zenoh.open(_zenoh_config(settings))
         except zenoh.ZError as error:
             tried = connect if mode == "client" else listen
             endpoints = ", ".join([endpoint for endpoint in tried if endpoint in str(error)] or tried)
@@ -228,6 +229,19 @@ class ZenohBus:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+@contextmanager
+def _one_runtime_thread() -> Iterator[None]:
+    """Set ZENOH_RUNTIME, which Zenoh reads when it opens a session; programs started later do not inherit it."""
+    if "ZENOH_RUNTIME" in os.environ:
+        yield
+        return
+    os.environ["ZENOH_RUNTIME"] = _RUNTIME
+    try:
+        yield
+    finally:
+        os.environ.pop("ZENOH_RUNTIME", None)
 
 
 def _zenoh_config(settings: Mapping[str, Any]) -> zenoh.Config:

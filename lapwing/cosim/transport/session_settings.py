@@ -33,13 +33,15 @@ def session_settings(listen: Sequence[str], connect: Sequence[str], mode: str, a
 
 
 CHILD_LINKS = {
+    "transport/unicast/open_timeout": 600_000,  # [ms]
+    "transport/unicast/accept_timeout": 600_000,  # [ms]
     "transport/link/tx/lease": 600_000,  # [ms]
     "transport/link/tx/queue/congestion_control/block/wait_before_close": 600_000_000,  # [us]
 }
 """Settings of the processes of one launcher.
 
-The launcher detects stalled processes and measures how long they waited for a CPU. Zenoh measures wall time only, and
-messages are lost when it closes a link.
+The launcher detects stalled processes and measures how long they waited for a CPU. Zenoh measures wall time only:
+messages are lost when it closes a link, and a link that is not open in time may send but never receive.
 """
 
 _LINUX = hasattr(socket, "TCP_USER_TIMEOUT")

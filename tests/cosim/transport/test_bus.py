@@ -1,6 +1,9 @@
 """Messages waiting on the bus use the memory of their bytes, not of the receive buffers."""
 
+import ast
+import os
 import re
+import subprocess
 import sys
 import threading
 import time
@@ -68,3 +71,28 @@ def test_wake_ends_wait_of_another_thread():
         arrived = bus.receive({KEY: MARK}, deferred=True)
         threading.Timer(0.1, arrived.wake).start()
         assert arrived.get_with_key(timeout=600.0) is None
+
+
+SESSION = """
+import os
+import sys
+from pathlib import Path
+from lapwing.cosim.transport.bus import ZenohBus
+with ZenohBus([sys.argv[1]]), ZenohBus(connect=[sys.argv[1]]) as bus:
+    bus.publisher("a")(b"", 0)
+    names = {(task / "comm").read_text().strip() for task in Path("/proc/self/task").iterdir()}
+print(sorted(name.partition("-")[0] for name in names if "-" in name))
+print(os.environ.get("ZENOH_RUNTIME"))
+"""
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="names of threads are told by Linux's /proc")
+def test_one_runtime_for_all_sessions_and_none_for_programs_started_later():
+    """In a program with one runtime thread, a callback that sends several fragments waits for itself."""
+    (endpoint,) = loopback_endpoints(["a"]).values()
+    environment = {key: value for key, value in os.environ.items() if key != "ZENOH_RUNTIME"}
+    command = [sys.executable, "-c", SESSION, endpoint]
+    output = subprocess.run(command, env=environment, check=True, capture_output=True, text=True, timeout=300).stdout
+    kinds, inherited = output.splitlines()
+    assert set(ast.literal_eval(kinds)) == {"app"}
+    assert inherited == "None"

@@ -1,5 +1,6 @@
 """Links to a process that reads nothing for a while: Zenoh closes them after a time, and messages are lost."""
 
+import json
 import os
 import signal
 import subprocess
@@ -14,13 +15,14 @@ from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.session_settings import CHILD_LINKS
 
 MESSAGES, SIZE = 100, 50_000  # much more than the buffers of a link hold
-PAUSE = 2.0  # [s] that the reader is stopped
-LEASE, WAIT = "transport/link/tx/lease", "transport/link/tx/queue/congestion_control/block/wait_before_close"
+PAUSE = 2.0  # [s] that the reader is stopped, perhaps while its link opens
+OPEN, LEASE = "transport/unicast/open_timeout", "transport/link/tx/lease"
+WAIT = "transport/link/tx/queue/congestion_control/block/wait_before_close"
 
 READER = f"""
-import sys
+import json, sys
 from lapwing.cosim.transport.bus import ZenohBus
-with ZenohBus(connect=[sys.argv[1]], awaits=False) as bus:
+with ZenohBus(connect=[sys.argv[1]], awaits=False, security=json.loads(sys.argv[2])) as bus:
     messages, count = bus.subscribe("congested/data"), 0
     bus.declare_liveliness("congested/reader")
     while (message := messages.get(120.0)) is not None and message[1]:
@@ -32,7 +34,7 @@ with ZenohBus(connect=[sys.argv[1]], awaits=False) as bus:
 def received(settings):
     """Return the number of messages that a reader gets that is stopped while they are sent."""
     with private_endpoints(["writer"]) as endpoints, ZenohBus([endpoints["writer"]], security=settings) as bus:
-        command = [sys.executable, "-c", READER, endpoints["writer"]]
+        command = [sys.executable, "-c", READER, endpoints["writer"], json.dumps(settings)]
         reader = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
         put = bus.publisher("congested/data")
         assert bus.wait_for_liveliness(["congested/reader"], 120.0) == []
@@ -60,4 +62,5 @@ def test_link_of_launcher_waits_for_starved_reader():
 
 def test_launcher_detects_stalled_process_before_zenoh_does():
     assert CHILD_LINKS[LEASE] > 1e3 * LONGEST
+    assert CHILD_LINKS[OPEN] > 1e3 * LONGEST
     assert CHILD_LINKS[WAIT] > 1e6 * LONGEST

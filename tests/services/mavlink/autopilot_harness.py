@@ -9,7 +9,7 @@ from lapwing.services.mavlink.adapter import Adapter
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
 
-OPERATED = ["autopilot.accept_commands=condition", "autopilot.follow_trajectory=false", "run.duration=1e4"]
+OPERATED = ["autopilot.accept_commands=true", "autopilot.follow_trajectory=false", "run.duration=1e4"]
 
 
 class AutopilotBench(Bench):

@@ -108,7 +108,7 @@ def test_check_warns_of_unstable_gains(tmp_path):
     assert result.exit_code == 0
     warnings = [line for line in result.output.splitlines() if "warning" in line]
     assert len(warnings) == 1
-    assert "altitude: unstable, gain margin -17.5 dB: its gain is too high" in warnings[0]
+    assert "altitude: unstable, gain margin -17.5 dB: the gain is too high" in warnings[0]
 
 
 def test_shipped_scenes_have_stable_gains():
