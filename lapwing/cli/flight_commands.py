@@ -155,13 +155,16 @@ def import_(
 
     with user_errors():
         check_distinct({"FLIGHT": flight, "--out": out})
-        if out.suffix != ".mcap" or flight.suffix == ".mcap":
-            raise ValueError(f"--out {out}: expected a .mcap file, made from a flight of another format")
+        if out.suffix != ".mcap":
+            raise ValueError(f"--out {out}: expected a name that ends in .mcap")
+        if flight.suffix == ".mcap":
+            raise ValueError(f"{flight}: is a log already; for a file of a rosbag2, use its folder with metadata.yaml")
         recording = open_flight(flight, mapping)
         if not recording.valid.any():
             raise ValueError(f"{flight}: no valid sample; check the --mapping")
         check_log(out)
-        write_log(out, recording, flight.name)
+        claim(out)
+        write_log(out.resolve(), recording, flight.name)
         typer.echo(
             f"{out}: {len(recording) * recording.interval:.1f} s, {int((~recording.valid).sum())} samples left out"
         )

@@ -1,5 +1,6 @@
 """Output of a recording as a Lapwing log, with the topics of a simulated flight."""
 
+import heapq
 import math
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
@@ -47,7 +48,7 @@ from lapwing.messages.types import (
     Vector3,
     VehicleState,
 )
-from lapwing.studies.flight_import.recording import Recording
+from lapwing.studies.flight_import.recording import Recording, Series
 
 VEHICLE = "drone1"
 FRAME = "world"
@@ -99,6 +100,8 @@ SENSORS: dict[str, tuple[Topic, Callable[[Header, Sequence[float]], Any]]] = {
 def write_log(path: Path, flight: Recording, source: str) -> None:
     """Write a recording as a log. The topics of the motion omit invalid samples; the metadata has their number.
 
+    The log is written beside `path`, with the ending `.part`, and replaces it when it is complete.
+
     Args:
         path: path of the log.
         flight: recording.
@@ -114,10 +117,17 @@ def write_log(path: Path, flight: Recording, source: str) -> None:
         "notes": "; ".join(flight.notes),
         "unknown_topics": ", ".join(flight.unknown),
     }
-    messages = sorted([*_motion(flight), *_readings(flight)], key=lambda entry: entry[0])
-    with LogWriter(path, metadata, {}) as log:
-        for time_ns, topic, message in messages:
-            log.write(topic.key(VEHICLE), type(message), message.encode(), time_ns)
+    messages = heapq.merge(_motion(flight), *_readings(flight), key=lambda entry: entry[0])
+    part = path.with_name(f"{path.name}.part")
+    log = LogWriter(part, metadata, {})
+    try:
+        with log:
+            for time_ns, topic, message in messages:
+                log.write(topic.key(VEHICLE), type(message), message.encode(), time_ns)
+        part.replace(path)
+    except BaseException:  # also an interrupt
+        part.unlink(missing_ok=True)
+        raise
 
 
 def _motion(flight: Recording) -> Iterator[tuple[int, Topic, Any]]:
@@ -153,13 +163,16 @@ def _motion(flight: Recording) -> Iterator[tuple[int, Topic, Any]]:
             yield time_ns, BATTERY, battery
 
 
-def _readings(flight: Recording) -> Iterator[tuple[int, Topic, Any]]:
-    """Yield (time [ns], topic, message) of the sensors at their sampling times."""
-    for name, series in flight.readings.items():
+def _readings(flight: Recording) -> list[Iterator[tuple[int, Topic, Any]]]:
+    """Return an iterator over (time [ns], topic, message) for each sensor at its sampling times."""
+
+    def messages(name: str, series: Series) -> Iterator[tuple[int, Topic, Any]]:
         topic, message = SENSORS[name]
-        for time, values in zip(series.time.tolist(), series.values.tolist(), strict=True):
-            if time >= 0.0 and all(map(math.isfinite, values)):
-                yield (time_ns := round(time * 1e9)), topic, message(_header(time_ns), values)
+        for time, values in zip(series.time, series.values, strict=True):
+            if time >= 0.0 and np.isfinite(values).all():
+                yield (time_ns := round(float(time) * 1e9)), topic, message(_header(time_ns), values.tolist())
+
+    return [messages(name, series) for name, series in flight.readings.items()]
 
 
 def _setpoint(header: Header, v: Sequence[float]) -> Setpoint:
