@@ -106,7 +106,8 @@ def from_columns(path: Path, table: dict[str, np.ndarray], mapping: Mapping) -> 
         setpoint = np.full((len(time), SETPOINT_WIDTH), np.nan)
         setpoint[:, :3] = desired
     plain: tuple[np.ndarray, ...] = position, attitude, velocity, omega, force, voltage, battery
-    if np.abs(np.diff(time) - interval).max() > 0.1 * interval:
+    clock_error = np.abs(time - interval * np.arange(len(time))).max()
+    if clock_error > interval or np.abs(np.diff(time) - interval).max() > 0.1 * interval:
         check_density(path, time[-1] / interval if interval > 0.0 else np.inf, len(time))
         grid = np.arange(0.0, time[-1] + 0.5 * interval, interval)
         plain, valid, power = _on_grid(grid, time, plain, valid, power)
