@@ -15,6 +15,8 @@ from lapwing.studies.flight_import.recording import Recording, Series
 from lapwing.studies.flight_import.rotation_arrays import from_ned_frd, ned_to_enu, rotate, unit
 
 PULSE_LOW, PULSE_SPAN = 1000.0, 1000.0  # [us]
+RC_OUT = "mavros_msgs/msg/RCOut"
+COMMANDS = ("setpoint", "target", "goal", "reference", "desired", "command")  # parts of the names of commanded poses
 
 
 def _xyz(v: Any) -> list[float]:
@@ -34,18 +36,22 @@ FIELDS: dict[str, Callable[[Any], Any]] = {  # values of each message by type
     "geometry_msgs/msg/PoseStamped": lambda m: [*_xyz(m.pose.position), *_wxyz(m.pose.orientation)],
     "sensor_msgs/msg/Imu": lambda m: [*_xyz(m.angular_velocity), *_xyz(m.linear_acceleration)],
     "sensor_msgs/msg/BatteryState": lambda m: [m.voltage, abs(m.current)],
-    "sensor_msgs/msg/NavSatFix": lambda m: [m.latitude, m.longitude, m.altitude],
+    "sensor_msgs/msg/NavSatFix": lambda m: (
+        [m.latitude, m.longitude, m.altitude] if m.status.status >= 0 else [np.nan] * 3
+    ),
     "sensor_msgs/msg/FluidPressure": lambda m: [m.fluid_pressure],
     "sensor_msgs/msg/MagneticField": lambda m: _xyz(m.magnetic_field),
     "sensor_msgs/msg/Range": lambda m: [m.range],
     "actuator_msgs/msg/Actuators": lambda m: m.normalized,
-    "mavros_msgs/msg/RCOut": lambda m: (np.asarray(m.channels[:4], float) - PULSE_LOW) / PULSE_SPAN,
+    RC_OUT: lambda m: (np.asarray(m.channels, float) - PULSE_LOW) / PULSE_SPAN,
     "px4_msgs/msg/ActuatorMotors": lambda m: m.control,
     "px4_msgs/msg/VehicleAttitude": lambda m: m.q,
     "px4_msgs/msg/VehicleLocalPosition": lambda m: [m.x, m.y, m.z, m.vx, m.vy, m.vz],
     "px4_msgs/msg/SensorCombined": lambda m: [*m.gyro_rad, *m.accelerometer_m_s2],
     "px4_msgs/msg/BatteryStatus": lambda m: [m.voltage_v, m.current_a],
 }
+
+POSES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped")
 
 
 def read_rosbag_flight(path: Path) -> Recording:
@@ -74,9 +80,13 @@ def read_rosbag_flight(path: Path) -> Recording:
     channels.omega = part(f"{ros}Imu", slice(0, 3)) or part(imu, slice(0, 3), lambda v: v * FLU)
     channels.specific_force = part(f"{ros}Imu", slice(3, 6)) or part(imu, slice(3, 6), lambda v: v * FLU)
     channels.battery = part(f"{ros}BatteryState", slice(0, 2)) or part(f"{px4}BatteryStatus", slice(0, 2))
-    for name in (f"{px4}ActuatorMotors", "actuator_msgs/msg/Actuators", "mavros_msgs/msg/RCOut"):
+    for name in (f"{px4}ActuatorMotors", "actuator_msgs/msg/Actuators", RC_OUT):
         if (source := series.get(name)) is not None:
             used = np.isfinite(source.values).any(axis=0)
+            if name == RC_OUT:
+                used &= np.ptp(source.values, axis=0) > 0.0  # servos at rest and unused channels do not change
+            if not used.any():
+                continue
             channels.duty = Series(source.time, np.nan_to_num(source.values[:, used]), source.dropped)
             channels.notes.append(f"motor commands from {name}")
             break
@@ -106,6 +116,8 @@ def _series(path: Path) -> tuple[dict[str, Series], tuple[str, ...]]:
             largest: dict[str, Any] = {}
             for connection in bag.connections:
                 kind = connection.msgtype
+                if any(part in connection.topic.lower() for part in COMMANDS) and kind in POSES:
+                    continue
                 if kind in FIELDS and connection.msgcount > (largest[kind].msgcount if kind in largest else 0):
                     largest[kind] = connection
             unknown = sorted({c.topic for c in bag.connections} - {c.topic for c in largest.values()})
@@ -116,7 +128,9 @@ def _series(path: Path) -> tuple[dict[str, Series], tuple[str, ...]]:
     except Exception:  # rosbags raises exceptions of many types
         raise ValueError(f"{path}: is not a readable rosbag2 folder; expected metadata.yaml and its messages") from None
     try:
-        return {k: Series.of([t for t, _ in r], [list(v) for _, v in r]) for k, r in rows.items()}, tuple(unknown)
+        return {
+            k: Series.of([t for t, _ in r], [list(v) for _, v in r]) for k, r in rows.items() if len(r[0][1])
+        }, tuple(unknown)
     except ValueError:
         raise ValueError(f"{path}: a topic's arrays change their length; record the flight again") from None
 
