@@ -7,6 +7,7 @@ import numpy as np
 LONGEST = 0.25  # [s] largest offset of the search
 SPAN = 5.0  # [s] duration of one estimate of the offset, for the drift
 FEWEST = 4  # minimum number of estimates for a drift
+STILL = 1e-9  # [rad^2/s^2] sum of squares below which there is no motion
 CLEAR = 0.6  # minimum correlation of an estimate
 
 
@@ -22,6 +23,7 @@ class ClockDrift(NamedTuple):
 def describe(attitude_rate: np.ndarray, omega: np.ndarray, valid: np.ndarray, interval: float) -> str:
     """Return a text on offset, correlation and drift. See `time_offset` for arguments."""
     offset, correlation = time_offset(attitude_rate, omega, valid, interval)
+    offset += 0.5 * interval  # the rate between two attitudes is that at the midpoint
     text = f"gyroscope {round(1e3 * offset):+d} ms against attitude, correlation {correlation:.2f}"
     drift = clock_drift(attitude_rate, omega, valid, interval)
     if drift is None:
@@ -83,11 +85,14 @@ def time_offset(
         return 0.0, 0.0
     a, b = (np.nan_to_num(v) - np.nan_to_num(v)[valid].mean(axis=0) for v in (attitude_rate, omega))
     a, b = np.where(valid[:, None], a, 0.0), np.where(valid[:, None], b, 0.0)
-    inner = slice(reach, n - reach)
-    norm = np.sqrt((a[inner] ** 2).sum() * (b[inner] ** 2).sum())
-    if norm == 0.0:
+    late = b[reach : n - reach] - b[reach : n - reach].mean(axis=0)
+    scores = np.zeros(2 * reach + 1)
+    for k in range(-reach, reach + 1):  # each window has its own mean and norm: slow motion changes them
+        early = a[reach - k : n - reach - k] - a[reach - k : n - reach - k].mean(axis=0)
+        if (norm := np.sqrt((early**2).sum() * (late**2).sum())) > STILL:
+            scores[k + reach] = (early * late).sum() / norm
+    if not scores.any():
         return 0.0, 0.0
-    scores = np.array([(a[reach - k : n - reach - k] * b[inner]).sum() for k in range(-reach, reach + 1)]) / norm
     best = int(scores.argmax())
     fraction = 0.0
     if 0 < best < 2 * reach:
