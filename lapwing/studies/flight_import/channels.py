@@ -65,6 +65,7 @@ def to_recording(path: Path, channels: Channels, motors: str, rates: str) -> Rec
         raise ValueError(f"{path}: no motor outputs ({motors}); log them and fly again")
     if channels.omega is None or len(channels.omega.time) < 2:
         raise ValueError(f"{path}: no rates ({rates}); log them and fly again")
+    channels.battery, unmeasured = _with_voltage(channels.battery)
     names = ("attitude", "position", "velocity", "omega", "specific_force", "duty", "battery")
     series = {name: s for name in names if (s := getattr(channels, name)) is not None and len(s.time) > 1}
     common = [series[name] for name in ("attitude", "position", "omega", "duty") if name in series]
@@ -101,6 +102,7 @@ def to_recording(path: Path, channels: Channels, motors: str, rates: str) -> Rec
     faults = {
         "gap in a topic": int((~valid).sum()),
         "not finite": int((~finite).sum()),
+        "battery not measured": unmeasured,
         "time not increasing": sum(s.dropped for s in (getattr(channels, name) for name in names) if s is not None),
     }
     volts = duty * np.where(np.isfinite(battery), battery, 1.0)[:, None]
@@ -129,6 +131,15 @@ def check_density(path: Path, samples: float, recorded: int) -> None:
         raise ValueError(
             f"{path}: time is damaged, {recorded} samples for {samples:.0f}; cut the file before the damage"
         )
+
+
+def _with_voltage(battery: Series | None) -> tuple[Series | None, int]:
+    """Return the readings with a voltage above 0, None if there are none, and the number of the others."""
+    if battery is None:
+        return None, 0
+    measured = battery.values[:, 0] > 0.0
+    result = Series(battery.time[measured], battery.values[measured], battery.dropped)
+    return result if measured.any() else None, int((~measured).sum())
 
 
 def _battery(values: np.ndarray | None, n: int) -> tuple[np.ndarray, np.ndarray]:
