@@ -37,7 +37,7 @@ DATAFLASH = {  # message: (type, format characters, field names)
     "GPS": (70, "QBIHLLf", "TimeUS,I,GMS,GWk,Lat,Lng,Alt"),
     "MSG": (71, "QZ", "TimeUS,Message"),
 }
-PACKED = {"Q": "Q", "N": "16s", "f": "f", "B": "B", "H": "H", "I": "I", "L": "i", "Z": "64s"}
+PACKED = {"b": "b", "Q": "Q", "N": "16s", "f": "f", "B": "B", "H": "H", "I": "I", "L": "i", "Z": "64s"}
 
 
 def dataflash_rows(flight):
@@ -88,6 +88,27 @@ def write_text(path, flight):
     path.write_text("\n".join(lines) + "\n")
 
 
+BOOT = 5.0  # [s] since boot, of a telemetry log's first message
+
+
+def telemetry(v, k):
+    """Messages of a telemetry log's sample k."""
+    from pymavlink.dialects.v20 import common as mavlink
+
+    ms = round(1e3 * BOOT) + 10 * k
+    us = 1000 * ms
+    pulse = [int(x) for x in np.round(1000.0 + 1000.0 * v["duty"][k])]
+    return [
+        mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3),
+        mavlink.MAVLink_attitude_quaternion_message(ms, *v["quaternion"][k], *v["omega"][k]),
+        mavlink.MAVLink_local_position_ned_message(ms, *v["position"][k], *v["velocity"][k]),
+        mavlink.MAVLink_highres_imu_message(us, *v["force"][k], *v["omega"][k], 0.2, 0.0, 0.4, 950.0, 0, 0, 20, 63),
+        mavlink.MAVLink_servo_output_raw_message(us % 2**32, 0, *pulse, 0, 0, 0, 0),
+        mavlink.MAVLink_sys_status_message(0, 0, 0, 0, round(BATTERY * 1e3), 200, 50, 0, 0, 0, 0, 0, 0),
+        mavlink.MAVLink_gps_raw_int_message(us, 3, 473977420, 85455940, 488000, 100, 100, 0, 0, 9),
+    ]
+
+
 def write_tlog(path, flight):
     from pymavlink.dialects.v20 import common as mavlink
 
@@ -96,21 +117,8 @@ def write_tlog(path, flight):
     station = mavlink.MAVLink(None, srcSystem=255, srcComponent=190)
     with path.open("wb") as file:
         for k in range(len(flight)):
-            ms, us = 5000 + 10 * k, 5_000_000 + 10_000 * k
-            pulse = [int(x) for x in np.round(1000.0 + 1000.0 * v["duty"][k])]
-            messages = [
-                mavlink.MAVLink_heartbeat_message(2, 12, 0, 0, 4, 3),
-                mavlink.MAVLink_attitude_quaternion_message(ms, *v["quaternion"][k], *v["omega"][k]),
-                mavlink.MAVLink_local_position_ned_message(ms, *v["position"][k], *v["velocity"][k]),
-                mavlink.MAVLink_highres_imu_message(
-                    us, *v["force"][k], *v["omega"][k], 0.2, 0.0, 0.4, 950.0, 0, 0, 20, 63
-                ),
-                mavlink.MAVLink_servo_output_raw_message(us, 0, *pulse, 0, 0, 0, 0),
-                mavlink.MAVLink_sys_status_message(0, 0, 0, 0, round(BATTERY * 1e3), 200, 50, 0, 0, 0, 0, 0, 0),
-                mavlink.MAVLink_gps_raw_int_message(us, 3, 473977420, 85455940, 488000, 100, 100, 0, 0, 9),
-            ]
-            stamp = struct.pack(">Q", 1_700_000_000_000_000 + us)
-            for message in messages:
+            stamp = struct.pack(">Q", 1_700_000_005_000_000 + 10_000 * k)
+            for message in telemetry(v, k):
                 file.write(stamp + message.pack(link))
             file.write(stamp + mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 4, 3).pack(station))
 

@@ -1,6 +1,7 @@
 """Recordings from ArduPilot's dataflash logs, binary (.bin) or text (.log), read by pymavlink.
 
-ArduPilot's axes are NED and FRD. The log's parameters define the outputs of motors and their pulse ranges.
+ArduPilot's axes are NED and FRD. The log's parameters define the outputs of motors and their pulse ranges. Of several
+sensors of a kind, the first is used; of several cores of the EKF, the primary one at each time.
 """
 
 import os
@@ -8,32 +9,24 @@ from collections import defaultdict
 from collections.abc import Iterator
 from contextlib import contextmanager, redirect_stderr, redirect_stdout
 from io import StringIO
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lapwing.studies.flight_import.channels import FLU, Channels, to_recording
-from lapwing.studies.flight_import.recording import Recording, Series, convert
+from lapwing.studies.flight_import.recording import Recording, Series, convert, longest_session, session_notes
 from lapwing.studies.flight_import.rotation_arrays import from_euler, from_ned_frd, ned_to_enu
 
 FIRST_MOTOR, NINTH_MOTOR = 33, 82  # SERVOn_FUNCTION of motors 1 to 8, and 9 to 12
 PULSE_LOW, PULSE_HIGH = 1000.0, 2000.0  # [us] default of the log's parameters
 MILLIGAUSS = 1e-7  # [T]
-INSTANCE = {
-    "IMU": "I",
-    "GPS": "I",
-    "BARO": "I",
-    "MAG": "I",
-    "BAT": "Inst",
-    "XKF1": "C",
-    "NKF1": "C",
-    "XKQ": "C",
-    "NKQ": "C",
-    "RFND": "Instance",
-    "ARSP": "I",
-}  # field of each message that numbers its source; fmt: skip
-USED = (*INSTANCE, "ATT", "RCOU", "CURR", "EKF1")
+INSTANCES = ("I", "C", "Inst", "Instance")  # fields that number the source of a message
+CORES = {"XKF1": "XKF4", "XKQ": "XKF4", "NKF1": "NKF4", "NKQ": "NKF4"}  # message that names the primary core
+EKF2 = 2  # AHRS_EKF_TYPE
+FIX = 3  # GPS.Status of a fix in three dimensions
+USED = (*CORES, "IMU", "GPS", "BARO", "MAG", "BAT", "RFND", "ARSP", "ATT", "RCOU", "CURR", "EKF1")
 
 
 def read_dataflash_flight(path: Path) -> Recording:
@@ -42,8 +35,8 @@ def read_dataflash_flight(path: Path) -> Recording:
     Raises:
         ValueError: the file is not a dataflash log, or a required message is missing.
     """
-    messages, parameters, unknown = _messages(path)
-    channels = Channels(unknown=tuple(sorted(unknown)))
+    messages, parameters, unknown, notes = _messages(path)
+    channels = Channels(unknown=tuple(sorted(unknown)), notes=notes)
 
     def series(name: str, *fields: str) -> Series | None:
         rows = [m for m in messages.get(name, []) if all(f in m for f in fields)]
@@ -53,17 +46,19 @@ def read_dataflash_flight(path: Path) -> Recording:
         return next((s for name, *fields in choices if (s := series(name, *fields)) is not None), None)
 
     quaternion = ("Q1", "Q2", "Q3", "Q4")
-    channels.attitude = convert(first(("XKQ", *quaternion), ("NKQ", *quaternion)), from_ned_frd)
+    families = ("NK", "XK") if parameters.get("AHRS_EKF_TYPE") == EKF2 else ("XK", "NK")
+    channels.attitude = convert(first(*((f"{family}Q", *quaternion) for family in families)), from_ned_frd)
     if channels.attitude is None:
         euler = series("ATT", "Roll", "Pitch", "Yaw")
         channels.attitude = convert(euler, lambda v: from_ned_frd(from_euler(np.radians(v))))
-    estimators = ("XKF1", "NKF1", "EKF1")
+    estimators = (*(f"{family}F1" for family in families), "EKF1")
     channels.position = convert(first(*((name, "PN", "PE", "PD") for name in estimators)), ned_to_enu)
     channels.velocity = convert(first(*((name, "VN", "VE", "VD") for name in estimators)), ned_to_enu)
     channels.omega = convert(series("IMU", "GyrX", "GyrY", "GyrZ"), lambda v: v * FLU)
     channels.specific_force = convert(series("IMU", "AccX", "AccY", "AccZ"), lambda v: v * FLU)
     channels.battery = first(("BAT", "Volt", "Curr"), ("CURR", "Volt", "Curr"))
-    channels.duty = _duty(messages, parameters, channels)
+    channels.duty = _duty(path, messages, parameters, channels)
+    messages["GPS"] = [m for m in messages["GPS"] if m.get("Status", FIX) >= FIX]
     raw = ("GyrX", "GyrY", "GyrZ", "AccX", "AccY", "AccZ")
     readings = {
         "imu": convert(series("IMU", *raw), lambda v: v * np.tile(FLU, 2)),
@@ -104,12 +99,13 @@ def _open_reader(kind: type, path: Path) -> Iterator[Any]:
                 getattr(reader, name).close()
 
 
-def _messages(path: Path) -> tuple[dict[str, list[dict[str, Any]]], dict[str, float], set[str]]:
-    """Return the messages of the first instance by name, the parameters, and the names of all other messages."""
+def _messages(path: Path) -> tuple[dict[str, list[dict[str, Any]]], dict[str, float], set[str], list[str]]:
+    """Return messages of the used instances by name, parameters, names of all other messages, and notes."""
     from pymavlink.DFReader import DFReader_binary, DFReader_text
 
-    result: dict[str, list[dict[str, Any]]] = defaultdict(list)
-    parameters, unknown = {}, set()
+    rows: list[dict[str, Any]] = []
+    primary: dict[str, int] = {}
+    cores, parameters, unknown = set(), {}, set()
     try:
         kind = DFReader_binary if path.suffix.lower() == ".bin" else DFReader_text
         with _silent(), _open_reader(kind, path) as reader:
@@ -117,9 +113,13 @@ def _messages(path: Path) -> tuple[dict[str, list[dict[str, Any]]], dict[str, fl
                 name, fields = message.get_type(), message.to_dict()
                 if name == "PARM":
                     parameters[str(fields.get("Name"))] = float(fields.get("Value", 0.0))
+                elif name in CORES.values():
+                    primary[name] = max(int(fields.get("PI", 0)), 0)
                 elif name in USED and "TimeUS" in fields:
-                    if not fields.get(INSTANCE.get(name, ""), 0):
-                        result[name].append(fields)
+                    core = primary.get(CORES.get(name, ""), 0)
+                    if next((fields[f] for f in INSTANCES if f in fields), core) == core:
+                        rows.append(fields)
+                        cores.update([core] if name in CORES else [])
                 else:
                     unknown.add(name)
     except OSError as error:
@@ -128,25 +128,46 @@ def _messages(path: Path) -> tuple[dict[str, list[dict[str, Any]]], dict[str, fl
         raise ValueError(
             f"{path}: is not a readable dataflash log; expected a .bin or .log file of ArduPilot"
         ) from None
-    if not result:
-        raise ValueError(f"{path}: is not a readable dataflash log; expected a .bin or .log file of ArduPilot")
-    return result, parameters, unknown - {"FMT", "FMTU", "UNIT", "MULT"}
-
-
-def _duty(messages: dict[str, list[dict[str, Any]]], parameters: dict[str, float], channels: Channels) -> Series | None:
-    rows = messages.get("RCOU")
     if not rows:
-        return None
-    outputs: dict[int, str] = {}
+        raise ValueError(f"{path}: is not a readable dataflash log; expected a .bin or .log file of ArduPilot")
+    used, sessions = longest_session(np.array([fields["TimeUS"] * 1e-6 for fields in rows]))
+    result: dict[str, list[dict[str, Any]]] = defaultdict(list)
+    for fields in compress(rows, used):
+        result[fields["mavpackettype"]].append(fields)
+    notes = [f"EKF core {', '.join(map(str, sorted(cores)))} was primary"] if cores - {0} else []
+    return result, parameters, unknown - {"FMT", "FMTU", "UNIT", "MULT"}, [*notes, *session_notes(sessions)]
+
+
+def motor_outputs(parameters: dict[str, float]) -> list[int]:
+    """Return the numbers of the outputs of motors 1, 2, ... from ArduPilot's parameters; empty if they have none."""
+    outputs: dict[int, int] = {}
     for n in range(1, 33):
         function = int(parameters.get(f"SERVO{n}_FUNCTION", 0))
         if FIRST_MOTOR <= function < FIRST_MOTOR + 8:
-            outputs[function - FIRST_MOTOR] = f"C{n}"
+            outputs[function - FIRST_MOTOR] = n
         elif NINTH_MOTOR <= function < NINTH_MOTOR + 4:
-            outputs[8 + function - NINTH_MOTOR] = f"C{n}"
-    used = [outputs[k] for k in sorted(outputs)] or [f"C{n}" for n in range(1, 5)]
-    low = parameters.get("MOT_PWM_MIN", 0.0) or PULSE_LOW
-    high = parameters.get("MOT_PWM_MAX", 0.0) or PULSE_HIGH
+            outputs[8 + function - NINTH_MOTOR] = n
+    return [outputs[k] for k in sorted(outputs)]
+
+
+def pulse_range(parameters: dict[str, float]) -> tuple[float, float]:
+    """Return the pulses [us] of motors at rest and at full throttle from ArduPilot's parameters."""
+    return parameters.get("MOT_PWM_MIN", 0.0) or PULSE_LOW, parameters.get("MOT_PWM_MAX", 0.0) or PULSE_HIGH
+
+
+def _duty(
+    path: Path, messages: dict[str, list[dict[str, Any]]], parameters: dict[str, float], channels: Channels
+) -> Series | None:
+    rows = messages.get("RCOU")
+    if not rows:
+        return None
+    outputs = motor_outputs(parameters)
+    if not outputs and any(name.startswith("SERVO") and name.endswith("_FUNCTION") for name in parameters):
+        raise ValueError(f"{path}: no output is a motor of a multirotor (SERVOn_FUNCTION); expected a multirotor's log")
+    used = [f"C{n}" for n in outputs or range(1, 5)]
+    if missing := [name for name in used if name not in rows[0]]:
+        raise ValueError(f"{path}: no motor outputs {', '.join(missing)} in RCOU; use outputs that are logged")
+    low, high = pulse_range(parameters)
     values = np.array([[row.get(name, 0.0) for name in used] for row in rows], float)
     channels.notes.append(f"motor commands from RCOU {', '.join(used)}, pulses from {low:.0f} to {high:.0f} us")
     return Series.of([row["TimeUS"] * 1e-6 for row in rows], (values - low) / (high - low))

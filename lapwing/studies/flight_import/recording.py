@@ -10,6 +10,7 @@ LONGEST_GAP = 0.035  # [s] largest time between two samples for interpolation
 LONGEST_HOLD = 0.5  # [s] largest time between two messages for valid interpolation
 GYRO_LIMIT = 35.0  # [rad/s] range of common gyroscopes, 2000 deg/s
 LOWEST = 0.3  # [m] minimum height of an airborne vehicle
+RESTART = 1.0  # [s] step backwards above which a clock has restarted
 RESOLUTION = 1e-6  # [s] resolution of time stamps
 SETPOINT_WIDTH = 11  # number of columns of a setpoint
 
@@ -30,11 +31,15 @@ class Series:
 
     @classmethod
     def of(cls, time: Any, values: Any) -> Self:
-        """Return the samples whose time is finite and later than all previous ones."""
+        """Return the samples whose time is finite and later than all previous ones.
+
+        Single times far ahead are omitted first: one damaged time stamp must not hide the rest of the flight.
+        """
         time, values = np.asarray(time, float), np.asarray(values, float)
         values = values.reshape(len(time), -1)
-        later = np.isfinite(time) & (
-            time > np.r_[-np.inf, np.maximum.accumulate(np.nan_to_num(time, nan=-np.inf))[:-1]]
+        plausible = np.where(time_spikes(time) & (time > np.r_[time[1:], np.inf]), np.nan, time)
+        later = np.isfinite(plausible) & (
+            plausible > np.r_[-np.inf, np.maximum.accumulate(np.nan_to_num(plausible, nan=-np.inf))[:-1]]
         )
         return cls(time[later], values[later], int((~later).sum()))
 
@@ -53,6 +58,32 @@ class Series:
         """Return True for times of `grid` [s] with neighbours at most `LONGEST_HOLD` apart, shape (len(grid),)."""
         right = np.clip(np.searchsorted(self.time, grid), 1, len(self.time) - 1)
         return np.asarray(self.time[right] - self.time[right - 1] <= LONGEST_HOLD)
+
+
+def time_spikes(time: np.ndarray) -> np.ndarray:
+    """Return True for times out of order whose two neighbours are in order, shape (n,)."""
+    before, after = np.r_[-np.inf, time[:-1]], np.r_[time[1:], np.inf]
+    return np.asarray((before < after) & ((time > after) | (time < before)))
+
+
+def longest_session(time: np.ndarray) -> tuple[np.ndarray, int]:
+    """Return the mask of the longest part between two restarts of the clock, shape (n,), and the number of parts.
+
+    Args:
+        time: times [s] in the order of recording, shape (n,); NaN for samples without one.
+    """
+    known = np.flatnonzero(np.isfinite(time))
+    known = known[~time_spikes(time[known])]
+    restarts = known[1:][np.diff(time[known]) < -RESTART]
+    session = np.searchsorted(restarts, np.arange(len(time)), side="right")
+    return session == np.bincount(session).argmax(), len(restarts) + 1
+
+
+def session_notes(sessions: int) -> list[str]:
+    """Return the remark on a log of several sessions."""
+    if sessions == 1:
+        return []
+    return [f"the clock restarts {sessions - 1} times: the longest of {sessions} parts; cut the file for the others"]
 
 
 def convert(source: Series | None, change: Callable[[np.ndarray], np.ndarray]) -> Series | None:

@@ -4,18 +4,28 @@ Axes are NED and FRD. The time is that since boot, or the reception time of mess
 """
 
 from collections import defaultdict
+from itertools import compress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from lapwing.studies.flight_import.channels import FLU, Channels, to_recording
-from lapwing.studies.flight_import.recording import Recording, Series, convert
+from lapwing.studies.flight_import.dataflash_flight import motor_outputs, pulse_range
+from lapwing.studies.flight_import.recording import Recording, Series, convert, longest_session, session_notes
 from lapwing.studies.flight_import.rotation_arrays import from_euler, from_ned_frd, ned_to_enu
 
-PULSE_LOW, PULSE_SPAN = 1000.0, 1000.0  # [us]
+HIGHEST_SHARE = 2.0  # values of ACTUATOR_OUTPUT_STATUS above are pulses [us]
 STANDARD_GRAVITY = 9.80665
 NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID
+WRAP = 2**32  # [us] period of the time stamp of SERVO_OUTPUT_RAW
+UNKNOWN_VOLTAGE = 65535  # SYS_STATUS.voltage_battery
+FIX = 3  # GPS_RAW_INT.fix_type of a fix in three dimensions
+DOWNWARD = 25  # MAV_SENSOR_ROTATION_PITCH_270
+OTHER_VEHICLES = {  # MAV_TYPE
+    1: "a fixed wing", 4: "a helicopter", 7: "an airship", 8: "a balloon", 9: "a rocket", 10: "a rover", 11: "a boat",
+    12: "a submarine",
+}  # fmt: skip
 EPOCH = 1e15  # [us] above which a time stamp is Unix time
 USED = {
     "ATTITUDE", "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED", "HIGHRES_IMU", "SCALED_IMU", "SCALED_IMU2", "RAW_IMU",
@@ -29,8 +39,8 @@ def read_tlog_flight(path: Path) -> Recording:
     Raises:
         ValueError: the file is not a telemetry log, or a required message is missing.
     """
-    messages, unknown = _messages(path)
-    channels = Channels(unknown=tuple(sorted(unknown)))
+    messages, parameters, unknown, notes = _messages(path)
+    channels = Channels(unknown=tuple(sorted(unknown)), notes=notes)
 
     def series(name: str, *fields: str, scale: float = 1.0) -> Series | None:
         if (rows := messages.get(name)) is None:
@@ -56,8 +66,8 @@ def read_tlog_flight(path: Path) -> Recording:
         force or series("RAW_IMU", "xacc", "yacc", "zacc", scale=milli_g), lambda v: v * FLU
     )
     battery = series("SYS_STATUS", "voltage_battery", "current_battery")
-    channels.battery = convert(battery, lambda v: v * [1e-3, 1e-2])
-    channels.duty = _duty(messages, channels)
+    channels.battery = convert(battery, _volts_and_amperes)
+    channels.duty = _duty(messages, parameters, channels)
     raw = ("xgyro", "ygyro", "zgyro", "xacc", "yacc", "zacc")
     readings = {
         "imu": convert(series("HIGHRES_IMU", *raw), lambda v: v * np.tile(FLU, 2)),
@@ -71,11 +81,18 @@ def read_tlog_flight(path: Path) -> Recording:
     return to_recording(path, channels, "SERVO_OUTPUT_RAW, ACTUATOR_OUTPUT_STATUS", "HIGHRES_IMU, ATTITUDE")
 
 
-def _messages(path: Path) -> tuple[dict[str, list[tuple[float, Any]]], set[str]]:
-    """Return (time [s] since boot, message) of one autopilot by name, and the names of all other messages."""
+def _volts_and_amperes(raw: np.ndarray) -> np.ndarray:
+    """Convert voltage [mV] and current [cA], shape (n, 2); NaN for unknown values."""
+    unknown = np.column_stack([raw[:, 0] == UNKNOWN_VOLTAGE, raw[:, 1] < 0.0])
+    return np.where(unknown, np.nan, raw * [1e-3, 1e-2])
+
+
+def _messages(path: Path) -> tuple[dict[str, list[tuple[float, Any]]], dict[str, float], set[str], list[str]]:
+    """Return (time [s] since boot, message) of one autopilot by name, parameters, other messages' names, and notes."""
     from pymavlink import mavutil
 
-    result: dict[str, list[tuple[float, Any]]] = defaultdict(list)
+    rows: list[tuple[float, Any]] = []
+    parameters: dict[str, float] = {}
     unknown: set[str] = set()
     system = None
     try:
@@ -84,21 +101,39 @@ def _messages(path: Path) -> tuple[dict[str, list[tuple[float, Any]]], set[str]]
             name = message.get_type()
             if name == "HEARTBEAT" and system is None and message.autopilot != NO_AUTOPILOT:
                 system = message.get_srcSystem()
+                if vehicle := OTHER_VEHICLES.get(message.type):
+                    raise ValueError(f"{path}: is the log of {vehicle}; expected a multirotor's log")
+            if name == "PARAM_VALUE" and message.get_srcComponent() == 1 and message.get_srcSystem() == system:
+                parameters[str(message.param_id)] = float(message.param_value)
             if name == "BAD_DATA":
                 continue
             if name not in USED:
                 unknown.add(name)
-            elif message.get_srcComponent() == 1:
-                result[name].append((message._timestamp, message))
+            elif message.get_srcComponent() == 1 and _is_first_instance(name, message):
+                rows.append((message._timestamp, message))
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
-    if not result:
-        raise ValueError(f"{path}: has no messages of an autopilot; expected a telemetry log (.tlog)")
     if system is not None:
-        result = {name: [r for r in rows if r[1].get_srcSystem() == system] for name, rows in result.items()}  # type: ignore[assignment]
-    boot_times = [t - m.time_boot_ms * 1e-3 for rows in result.values() for t, m in rows if hasattr(m, "time_boot_ms")]
-    boot = float(np.median(boot_times)) if boot_times else 0.0
-    return {name: [(_time(t - boot, m), m) for t, m in rows] for name, rows in result.items() if rows}, unknown
+        rows = [row for row in rows if row[1].get_srcSystem() == system]
+    if not rows:
+        raise ValueError(f"{path}: has no messages of an autopilot; expected a telemetry log (.tlog)")
+    since_boot = np.array([getattr(m, "time_boot_ms", np.nan) * 1e-3 for _, m in rows])
+    used, sessions = longest_session(since_boot)
+    boot_times = np.array([t for t, _ in rows])[used] - since_boot[used]
+    boot = float(np.nanmedian(boot_times)) if np.isfinite(boot_times).any() else 0.0
+    result: dict[str, list[tuple[float, Any]]] = defaultdict(list)
+    for received, message in compress(rows, used):
+        result[message.get_type()].append((_time(received - boot, message), message))
+    return result, parameters, unknown, session_notes(sessions)
+
+
+def _is_first_instance(name: str, message: Any) -> bool:
+    """Return False for other sensors of the same kind, rangefinders that do not look down, and fixes that are none."""
+    if name == "DISTANCE_SENSOR":
+        return bool(message.orientation == DOWNWARD)
+    if name == "GPS_RAW_INT":
+        return bool(message.fix_type >= FIX)
+    return all(getattr(message, field) == 0 for field in ("id", "port") if field in message.fieldnames)
 
 
 def _time(received: float, message: Any) -> float:
@@ -106,22 +141,31 @@ def _time(received: float, message: Any) -> float:
     if hasattr(message, "time_boot_ms"):
         return float(message.time_boot_ms) * 1e-3
     stamp = getattr(message, "time_usec", 0)
+    if message.get_type() == "SERVO_OUTPUT_RAW" and stamp > 0 and received * 1e6 < EPOCH:
+        stamp += WRAP * round((received * 1e6 - stamp) / WRAP)
     return float(stamp) * 1e-6 if 0 < stamp < EPOCH else received
 
 
-def _duty(messages: dict[str, list[tuple[float, Any]]], channels: Channels) -> Series | None:
-    """Return the fractions of full throttle of the outputs that change."""
+def _duty(
+    messages: dict[str, list[tuple[float, Any]]], parameters: dict[str, float], channels: Channels
+) -> Series | None:
+    """Return the shares of full throttle of the outputs that ArduPilot's parameters name, or of those that change."""
     name = "ACTUATOR_OUTPUT_STATUS" if "ACTUATOR_OUTPUT_STATUS" in messages else "SERVO_OUTPUT_RAW"
     if name not in messages:
         return None
     rows = messages[name]
     if name == "SERVO_OUTPUT_RAW":
-        values = np.array([[getattr(m, f"servo{n}_raw") for n in range(1, 9)] for _, m in rows], float)
-        values = (values - PULSE_LOW) / PULSE_SPAN
+        values = np.array([[getattr(m, f"servo{n}_raw", 0) for n in range(1, 17)] for _, m in rows], float)
     else:
-        values = np.array([list(m.actuator)[: m.active.bit_length()] for _, m in rows], float)
-    used = np.flatnonzero(np.ptp(values, axis=0) > 0.0)
+        active = max(m.active.bit_length() for _, m in rows)
+        values = np.array([list(m.actuator)[:active] for _, m in rows], float)
+    used = np.array(motor_outputs(parameters), int) - 1
+    if not len(used) or used.max() >= values.shape[1]:
+        used = np.flatnonzero(np.ptp(values, axis=0) > 0.0)
     if not len(used):
         return None
     channels.notes.append(f"motor commands from {name}, outputs {', '.join(str(k + 1) for k in used)}")
+    if name == "SERVO_OUTPUT_RAW" or np.nanmax(values) > HIGHEST_SHARE:
+        low, high = pulse_range(parameters)
+        values = (values - low) / (high - low)
     return Series.of([t for t, _ in rows], values[:, used])

@@ -25,30 +25,7 @@ from scipy.spatial.transform import Rotation
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_import.dataflash_flight import read_dataflash_flight
 from lapwing.studies.flight_import.open_flight import open_flight
-from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.flight_import.rotation_arrays import conjugate, product, rotation_vector
-
-
-@pytest.fixture(scope="module")
-def flight() -> Recording:
-    """A smooth turn in all axes whose rates, specific force and velocity belong to its attitude and position."""
-    t = INTERVAL * np.arange(SAMPLES)
-    angles = np.column_stack([0.8 * t, 0.3 * np.sin(2.0 * t), 0.2 * np.cos(1.5 * t)])  # yaw, pitch, roll
-    turn = Rotation.from_euler("ZYX", angles)
-    h = 1e-5
-    ahead = Rotation.from_euler(
-        "ZYX", np.column_stack([0.8 * (t + h), 0.3 * np.sin(2 * (t + h)), 0.2 * np.cos(1.5 * (t + h))])
-    )
-    omega = (turn.inv() * ahead).as_rotvec() / h
-    position = np.column_stack([1.0 + 0.5 * t, 2.0 * np.sin(t), 3.0 + 0.2 * t**2])
-    velocity = np.column_stack([0.5 + 0.0 * t, 2.0 * np.cos(t), 0.4 * t])
-    acceleration = np.column_stack([0.0 * t, -2.0 * np.sin(t), 0.4 + 0.0 * t])
-    force = turn.inv().apply(acceleration + np.array([0.0, 0.0, GRAVITY]))
-    duty = 0.5 + 0.1 * np.column_stack([np.sin(t + k) for k in range(4)])
-    return Recording(
-        "flight", INTERVAL, position, turn.as_quat()[:, [3, 0, 1, 2]], velocity, omega, force, duty * BATTERY,
-        np.full(SAMPLES, BATTERY), np.ones(SAMPLES, bool),
-    )  # fmt: skip
 
 
 @pytest.mark.parametrize("name", WRITERS)
@@ -67,6 +44,7 @@ def test_format_returns_flight(tmp_path, flight, name):
     assert result.specific_force == pytest.approx(flight.specific_force[:n], abs=2e-3)
     assert result.motor_voltage == pytest.approx(flight.motor_voltage[:n], abs=5e-3)
     assert result.battery_voltage == pytest.approx(np.full(n, BATTERY), abs=1e-3)
+    assert any(note.startswith("gyroscope +0 ms against attitude, correlation 1.00") for note in result.notes)
 
 
 def test_ulog_setpoints_are_those_of_the_trajectory(tmp_path, flight):

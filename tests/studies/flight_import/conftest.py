@@ -1,0 +1,31 @@
+"""Flight that the writers of all formats write."""
+
+import numpy as np
+import pytest
+from flight_recordings import BATTERY
+from flight_writers import GRAVITY, INTERVAL, SAMPLES
+from scipy.spatial.transform import Rotation
+
+from lapwing.studies.flight_import.recording import Recording
+
+
+@pytest.fixture(scope="module")
+def flight() -> Recording:
+    """A smooth turn in all axes whose rates, specific force and velocity belong to its attitude and position."""
+    t = INTERVAL * np.arange(SAMPLES)
+    angles = np.column_stack([0.8 * t, 0.3 * np.sin(2.0 * t), 0.2 * np.cos(1.5 * t)])  # yaw, pitch, roll
+    turn = Rotation.from_euler("ZYX", angles)
+    h = 1e-5
+    ahead = Rotation.from_euler(
+        "ZYX", np.column_stack([0.8 * (t + h), 0.3 * np.sin(2 * (t + h)), 0.2 * np.cos(1.5 * (t + h))])
+    )
+    omega = (turn.inv() * ahead).as_rotvec() / h
+    position = np.column_stack([1.0 + 0.5 * t, 2.0 * np.sin(t), 3.0 + 0.2 * t**2])
+    velocity = np.column_stack([0.5 + 0.0 * t, 2.0 * np.cos(t), 0.4 * t])
+    acceleration = np.column_stack([0.0 * t, -2.0 * np.sin(t), 0.4 + 0.0 * t])
+    force = turn.inv().apply(acceleration + np.array([0.0, 0.0, GRAVITY]))
+    duty = 0.5 + 0.1 * np.column_stack([np.sin(t + k) for k in range(4)])
+    return Recording(
+        "flight", INTERVAL, position, turn.as_quat()[:, [3, 0, 1, 2]], velocity, omega, force, duty * BATTERY,
+        np.full(SAMPLES, BATTERY), np.ones(SAMPLES, bool),
+    )  # fmt: skip
