@@ -25,7 +25,7 @@ class ScheduledBlock(NamedTuple):
     bound: BoundBlock | None
     every: int  # [ticks] between two steps
     vehicle: int  # index of the vehicle
-    name: str  # of its parameters: "plant", "plant.from_tick_76"
+    name: str  # of its parameters: "plant", "plant.from_tick_651"
     until: int = NEVER  # first tick of its replacement
     following: int = 0  # index of its replacement
 

@@ -18,11 +18,11 @@ from lapwing.fmi.exported_part import export_part  # noqa: E402
 from lapwing.fmi.fmu import export_fmu  # noqa: E402
 
 pytestmark = pytest.mark.long
-LOCKED, FREE = '{time=0.301, propeller=2, failure="locked"}', '{time=0.302, propeller=1, failure="free"}'
-TORN_OFF = '{time=0.305, propeller=4, failure="torn_off"}'  # in the tick after that of the others
+LOCKED, FREE = '{time=2.601, propeller=2, failure="locked"}', '{time=2.602, propeller=1, failure="free"}'
+TORN_OFF = '{time=2.605, propeller=4, failure="torn_off"}'  # in the tick after that of the others
 FAILURES = f"[{LOCKED}, {FREE}, {TORN_OFF}]"
-SCENE = {"vehicle.model": "multibody", "run.duration": 0.5, "success.require": "[]"}
-TICK, FIRST, SECOND = 0.004, 0.304, 0.308  # [s]; ends of the ticks in which propellers fail
+SCENE = {"vehicle.model": "multibody", "run.duration": 3.6, "success.require": "[]"}  # it falls from 1 m
+TICK, FIRST, SECOND = 0.004, 2.604, 2.608  # [s]; ends of the ticks in which propellers fail
 SPEED = "truth.rotor_speed"
 
 
@@ -83,7 +83,7 @@ def test_fmi_2_has_recorded_outputs(tmp_path: Path) -> None:
     export_fmu(recorded.setup, "vehicle", path, 2)
     assert validate_fmu(str(path)) == []
     names = [f"{SPEED}[{k}]" for k in range(4)]
-    result = simulate_fmu(str(path), output=names, stop_time=0.5, output_interval=TICK)
+    result = simulate_fmu(str(path), output=names, stop_time=(recorded.ticks - 1) * TICK, output_interval=TICK)
     speeds = np.array([result[name] for name in names]).T
     column = [v.name for v in fmpy.read_model_description(str(path)).modelVariables if v.name.startswith("truth.")]
     first = column.index(names[0])
@@ -99,16 +99,15 @@ def test_library_has_recorded_outputs(part: str, tmp_path: Path) -> None:
 
 def test_vehicle_of_fleet_fails_alone(tmp_path: Path) -> None:
     failing = {"vehicle.0.model": "multibody", "vehicle.0.multibody.event": FAILURES}
-    native, recorded = built(tmp_path, "fleet", "plant", **failing, **{"run.duration": 0.5, "success.require": "[]"})
+    native, recorded = built(tmp_path, "fleet", "plant", **failing, **{"run.duration": 2.8, "success.require": "[]"})
     native.compare(recorded, 0, recorded.ticks)
 
 
 def test_step_ends_early_at_each_failure(vehicle: Path) -> None:
     a = begun(vehicle, eventModeUsed=True, earlyReturnAllowed=True)
-    times = []
-    reached = 0.0
-    while reached < 0.4:
-        event, terminate, early, reached = a.fmu.doStep(reached, 0.4 - reached)
+    times, reached, end = [], 0.0, 2.7
+    while reached < end:
+        event, terminate, early, reached = a.fmu.doStep(reached, end - reached)
         assert event == early
         assert not terminate
         if event:
@@ -119,17 +118,17 @@ def test_step_ends_early_at_each_failure(vehicle: Path) -> None:
         if reached == pytest.approx(FIRST):
             assert a.get(f"{SPEED}[1]") == pytest.approx(0.0, abs=1e-9)
             assert a.get(f"{SPEED}[3]") > 100.0
-    assert [t for t in times if t > 0.28] == pytest.approx([FIRST, SECOND])  # before: the take-off
+    assert [t for t in times if t > 2.5] == pytest.approx([FIRST, SECOND])  # before: the take-off
     assert a.get(f"{SPEED}[3]") == 0.0
     a.close()
 
 
 def test_step_reports_failure_without_early_return(vehicle: Path) -> None:
     a, b = begun(vehicle), begun(vehicle, eventModeUsed=True, earlyReturnAllowed=False)
-    expected = stepped(a, 100)
-    b.fmu.doStep(0.0, 0.3)
-    event, _, early, reached = b.fmu.doStep(0.3, 0.1)
-    assert (event, early, reached) == (True, False, 0.4)
+    expected = stepped(a, 675)
+    b.fmu.doStep(0.0, 2.6)
+    event, _, early, reached = b.fmu.doStep(2.6, 0.1)
+    assert (event, early, reached) == (True, False, 2.7)
     assert height_and_speeds(b) == expected[-1]
     for each in (a, b):
         each.close()
@@ -138,25 +137,25 @@ def test_step_reports_failure_without_early_return(vehicle: Path) -> None:
 def test_saved_states_continue_before_and_after_failure(vehicle: Path) -> None:
     """The state does not depend on the failures that its instance has had."""
     a = begun(vehicle)
-    stepped(a, 70)
+    stepped(a, 640)
     before = a.saved()
-    first = stepped(a, 6)  # to the tick of the first failures
+    first = stepped(a, 11)  # to the tick of the first failures
     between = a.saved()
     rest = stepped(a, 40)
     fresh = begun(vehicle)
     fresh.load(between)
     assert fresh.saved() == between
-    fresh.time = 76 * TICK
+    fresh.time = 651 * TICK
     assert stepped(fresh, 40) == rest
     for each in (a, fresh):  # back to intact propellers
         each.load(before)
-        each.time = 70 * TICK
-        assert stepped(each, 46) == first + rest
+        each.time = 640 * TICK
+        assert stepped(each, 51) == first + rest
         each.close()
 
 
 def test_parameters_after_failure_have_their_own_names() -> None:
     part = export_part(setup_of(), "plant")
     names = {leaf.path.partition("|")[0] for leaf in part.image.leaves}
-    assert {"plant", "plant.from_tick_76", "plant.from_tick_77", "plant.from_tick_78"} <= names
-    assert part.events == [76, 77]
+    assert {"plant", "plant.from_tick_651", "plant.from_tick_652", "plant.from_tick_653"} <= names
+    assert part.events == [651, 652]
