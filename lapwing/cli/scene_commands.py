@@ -52,23 +52,27 @@ def check(
         bool, typer.Option("--accuracy", help="fly it, and compare the error with solver.accuracy")
     ] = False,
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the errors of --accuracy as JSON")] = None,
+    allow_code: Annotated[
+        bool, typer.Option("--allow-code", help="allow FMUs, and Python modules of a log, to run for --accuracy")
+    ] = False,
     set_: Overrides = None,
 ) -> None:
     """Validate a scene and show what it contains.
 
     With --accuracy the exit code is 1 if the error of the solver is larger than solver.accuracy.
     """
+    from lapwing.services.common import foreign_code
     from lapwing.services.common.communication_schema import Communication
     from lapwing.services.common.run_schema import Run
     from lapwing.services.common.vehicle_schema import Vehicle
     from lapwing.services.scene_resolver import resolve
 
-    with user_errors():
+    with user_errors(), foreign_code.permission(allow_code):
         if json and not accuracy:
             raise ValueError("--json: holds the errors of a flight; give --accuracy, too")
         claim(json)
         if scene.suffix == ".mcap":
-            if not _accuracy_met(_accuracy_of_log(scene, accuracy, set_ or []), json):
+            if not _accuracy_met(_accuracy_of_log(scene, accuracy, set_ or [], allow_code), json):
                 raise SystemExit(1)
             return
         loaded = with_solver_selected(scene, set_ or [])
@@ -94,7 +98,7 @@ def check(
                 raise SystemExit(1)
 
 
-def _accuracy_of_log(log: Path, accuracy: bool, overrides: list[str]) -> "FlightAccuracy":
+def _accuracy_of_log(log: Path, accuracy: bool, overrides: list[str], allow_code: bool) -> "FlightAccuracy":
     """Return the error of the solver in a recorded run."""
     from lapwing.cosim.scene import with_values
     from lapwing.runs.resimulate import recorded_run
@@ -108,7 +112,7 @@ def _accuracy_of_log(log: Path, accuracy: bool, overrides: list[str]) -> "Flight
         raise ValueError("--set: the solver of a log is the recorded one; only solver.accuracy can be set")
     if asked is not None and not (isinstance(asked, int | float) and asked > 0.0):
         raise ValueError(f"--set solver.accuracy: expected a number above 0, got {asked!r}")
-    run = recorded_run(log)
+    run = recorded_run(log, allow_code)
     flown = {"operator": run.operators, "recorded": run.firmware}
     return flight_accuracy.measure_recorded(run.setup._replace(last_tick=run.last), flown, _with_bar, asked)
 

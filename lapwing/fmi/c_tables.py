@@ -25,20 +25,21 @@ def tables(part: ExportedPart, symbols: Sequence[str | None], variables: Sequenc
     staged = [float(x) for port in part.inputs for x in pack_row(port.port.like)]
     blocks = [
         f"{{{symbol or 'NULL'}, {part.image.cells[_rank(part, k)] if block.bound else 0}, {block.every},"
-        f" {block.vehicle}}}"
+        f" {block.vehicle}, {block.until}, {block.following}}}"
         for k, (block, symbol) in enumerate(zip(part.blocks, symbols, strict=True))
     ]
     contacts = [k for k, each in enumerate(variables, 1) if each.name.endswith(CONTACT)]
     sizes = {
         "IMAGE_SIZE": len(part.image.data),
         "RELOCATIONS": len(part.image.relocations),
-        "BLOCKS": len(blocks),
+        "BLOCKS": len(blocks) - part.replacements,
         "VEHICLES": 1 + max(block.vehicle for block in part.blocks),
         "INPUTS": len(part.inputs),
         "STAGED": len(staged),
         "ACTIONS": len(actions),
         "VARIABLES": len(variables) + 1,
         "EVENTS": len(contacts),
+        "FAILURES": len(part.events),
         "PART_IMAGE": image,
         "PART_INTERVAL": f"(1.0 / {part.setup.rate})",
     }
@@ -46,7 +47,7 @@ def tables(part: ExportedPart, symbols: Sequence[str | None], variables: Sequenc
         [
             *(f"#define {name} {value}" for name, value in sizes.items()),
             f"extern const unsigned char {image}[];",
-            *(f"extern step_function {symbol};" for symbol in symbols if symbol),
+            *(f"extern step_function {symbol};" for symbol in dict.fromkeys(symbols) if symbol),
             _table("relocation", "part_relocations", (f"{{{at}, {to}}}" for at, to in part.image.relocations)),
             _table("block", "part_blocks", blocks),
             _table("port", "part_inputs", _ports(part, part.inputs)),
@@ -57,6 +58,7 @@ def tables(part: ExportedPart, symbols: Sequence[str | None], variables: Sequenc
             _table("unsigned char", "part_written", (str(byte) for byte in written)),
             _table("variable", "part_variables", ['{"time", TIME, REAL, 0, 0, 0}', *map(_variable, variables)]),
             _table("uint32_t", "part_events", map(str, contacts)),
+            _table("int64_t", "part_failures", map(str, part.events)),
             "",
         ]
     )

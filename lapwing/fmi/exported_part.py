@@ -5,12 +5,13 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 from lapwing.cosim.config.run_config import RunConfig
-from lapwing.cosim.diagram.block_diagram import BlockDiagram
+from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram
 from lapwing.cosim.diagram.compiled_block import Block, BoundBlock
 from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
 from lapwing.fmi.memory_image import MemoryImage, image_of
 from lapwing.fmi.python_actions import Action, record_actions
 from lapwing.services.fmu.service_config import fmus_of, replaced_ports
+from lapwing.services.plant.service import PropellerFailures
 from lapwing.services.process_table import create_all
 
 VEHICLE = "vehicle"
@@ -18,12 +19,15 @@ PARTS = ("plant", "sensors", "autopilot", "trajectory", VEHICLE)
 
 
 class ScheduledBlock(NamedTuple):
-    """A block in the order of execution; a Python block has neither code nor memory."""
+    """A block in the order of execution, or its replacement; a Python block has neither code nor memory."""
 
     part: Any  # `Block` or Python block
     bound: BoundBlock | None
     every: int  # [ticks] between two steps
     vehicle: int  # index of the vehicle
+    name: str  # of its parameters: "plant", "plant.from_tick_651"
+    until: int = NEVER  # first tick of its replacement
+    following: int = 0  # index of its replacement
 
 
 class BoundaryPort(NamedTuple):
@@ -42,7 +46,9 @@ class ExportedPart:
     Attributes:
         name: name of the part, e.g. "plant".
         setup: run configuration.
-        blocks: in the order of execution.
+        blocks: in the order of execution, followed by replacements at later ticks.
+        replacements: number of these.
+        events: first ticks whose outputs a propeller failure affects.
         inputs: ports that blocks outside of the part write.
         outputs: ports of the services of the part.
         image: memory before the first tick.
@@ -52,6 +58,8 @@ class ExportedPart:
     name: str
     setup: RunConfig
     blocks: list[ScheduledBlock]
+    replacements: int
+    events: list[int]
     inputs: list[BoundaryPort]
     outputs: list[BoundaryPort]
     image: MemoryImage
@@ -77,11 +85,9 @@ def export_part(setup: RunConfig, name: str) -> ExportedPart:
         _check(part)
     diagram = BlockDiagram(setup, own, 1)
     parts: Sequence[Any] = diagram._parts
-    vehicles = list(dict.fromkeys(getattr(part, "vehicle", "") for part in parts))
-    blocks = [
-        ScheduledBlock(part, bound, getattr(part, "every", 1), vehicles.index(getattr(part, "vehicle", "")))
-        for part, bound in zip(parts, diagram._codes, strict=True)
-    ]
+    replacing = [failures for part in parts if (failures := _propeller_failures(part))]
+    blocks = _scheduled(diagram)
+    replacements = _replacements(blocks, replacing)
     produced = {port.name for part in parts for port in part.outputs}
     lags: dict[str, int] = {}
     for part in parts:
@@ -89,9 +95,10 @@ def export_part(setup: RunConfig, name: str) -> ExportedPart:
             if needed.port not in produced:
                 lags[needed.port] = min(lags.get(needed.port, 1), needed.delay)
     published = [port for each in names for port in setup.services[each].ports]
-    roots = [(block.part.name, block.bound.cell) for block in blocks if block.bound]
+    roots = [(block.name, block.bound.cell) for block in (*blocks, *replacements) if block.bound]
     image = image_of(roots, diagram._rows)
-    actions = record_actions(setup, services, image, diagram) if any(b.bound is None for b in blocks) else []
+    python = {block.name for block in blocks if not block.bound}
+    actions = [a for a in record_actions(setup, services, image, diagram) if a.block in python] if python else []
     originals = {own: port for port, own in replaced_ports(fmus_of(setup.services)).items()}
 
     def boundary(port: Port, lag: int) -> BoundaryPort:
@@ -101,7 +108,9 @@ def export_part(setup: RunConfig, name: str) -> ExportedPart:
     return ExportedPart(
         name,
         setup,
-        blocks,
+        [*blocks, *replacements],
+        len(replacements),
+        sorted({tick for each in replacing for tick in each.events}),
         [boundary(diagram.ports[port], lag) for port, lag in lags.items()],
         [boundary(port, 0) for port in published if port.name in diagram._rows],
         image,
@@ -117,8 +126,36 @@ def _check(part: Any) -> None:
     is_connected = hasattr(inner, "reports")  # connected to a firmware or another program
     if is_connected or any(port.period != LATCHED for port in part.outputs) or not module.startswith("lapwing."):
         raise ValueError(f"{part.name}: runs Python code of the scene; only compiled blocks can be exported")
-    if type(inner).__name__ == "PropellerFailures":
-        raise ValueError(f"{part.name}: [multibody.event] replaces code in flight; remove the event from the scene")
+
+
+def _propeller_failures(part: Any) -> PropellerFailures | None:
+    inner = getattr(part, "_part", part)
+    return inner if isinstance(inner, PropellerFailures) else None
+
+
+def _scheduled(diagram: BlockDiagram) -> list[ScheduledBlock]:
+    """Return the blocks of a diagram; those that only replace others have no effect of their own."""
+    vehicles = list(dict.fromkeys(getattr(part, "vehicle", "") for part in diagram._parts))
+    return [
+        ScheduledBlock(part, bound, getattr(part, "every", 1), vehicles.index(getattr(part, "vehicle", "")), part.name)
+        for part, bound in zip(diagram._parts, diagram._codes, strict=True)
+        if not _propeller_failures(part)
+    ]
+
+
+def _replacements(blocks: list[ScheduledBlock], replacing: Sequence[PropellerFailures]) -> list[ScheduledBlock]:
+    """Return the blocks that replace others after propeller failures, and link each block to its replacement."""
+    rows = list(blocks)
+    latest = {block.name: k for k, block in enumerate(rows)}
+    for failures in replacing:
+        for tick, replaced in sorted(failures.replacements.items()):
+            for part, bound in replaced:
+                k = latest[part.name]
+                latest[part.name] = len(rows)
+                rows.append(rows[k]._replace(part=part, bound=bound, name=f"{part.name}.from_tick_{tick}"))
+                rows[k] = rows[k]._replace(until=tick, following=latest[part.name])
+    blocks[:] = rows[: len(blocks)]
+    return rows[len(blocks) :]
 
 
 def _choices(setup: RunConfig) -> str:

@@ -79,13 +79,14 @@ def build_folder(part: ExportedPart, variables: Sequence[Variable], prefix: str,
         symbols: list[str | None] = []
         objects = [folder / "image.o"]
         objects[0].write_bytes(data_object(f"{prefix}_image", bytes(part.image.data)))
+        emitted: dict[int, str] = {}  # symbols by address of the code here: blocks of the same types share it
         for k, block in enumerate(part.blocks):
-            symbols.append(f"{prefix}_step_{k}" if block.bound else None)
-            if block.bound:
+            if block.bound and block.bound.function not in emitted:
+                emitted[block.bound.function] = symbol = f"{prefix}_step_{k}"
                 objects.append(folder / f"step_{k}.o")
                 names = {each: f"{prefix}_{each}" for each in _SYMBOLS}
-                code = step_code(block.part, block.bound, f"{prefix}_step_{k}", cpu, names)
-                objects[-1].write_bytes(code)
+                objects[-1].write_bytes(step_code(block.part, block.bound, symbol, cpu, names))
+            symbols.append(emitted[block.bound.function] if block.bound else None)
         (folder / "tables.h").write_text(tables(part, symbols, variables, f"{prefix}_image"), encoding="ascii")
         yield BuildFolder(folder, tuple(objects), prefix)
 

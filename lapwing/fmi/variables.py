@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 from numba.core import types
 
 from lapwing.cosim.diagram.tick_schedule import Port
+from lapwing.dynamics.vehicles.propeller_failures import Failure
 from lapwing.fmi.exported_part import BoundaryPort, ExportedPart
 from lapwing.kernels.row_packing import pack_row
 from lapwing.services.common.field_units import field_unit
@@ -40,6 +41,8 @@ def variables_of(part: ExportedPart) -> list[Variable]:
         kind, _, rest = path.partition(".")
         if kind not in ("parameters", "state") or leaf.kind != types.float64:
             continue  # whole numbers are sizes, counts and switches
+        if leaf.owner is Failure:
+            continue  # its time must lie within its tick
         (start,) = struct.unpack_from("<d", part.image.data, leaf.offset)
         unit = field_unit(leaf.owner, leaf.field)
         prefix, causality = ("parameters", PARAMETER) if kind == "parameters" else ("state", STATE)

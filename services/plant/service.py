@@ -97,7 +97,12 @@ def _divergence_error(setup: RunConfig, plant: PlantSetup, state: Cell) -> Any:
 
 
 class PropellerFailures:
-    """Replaces the plant when a propeller is locked, freed or torn off in flight; the state continues."""
+    """Replaces the plant when a propeller is locked, freed or torn off in flight; the state continues.
+
+    Attributes:
+        events: first ticks whose outputs a failure affects.
+        replacements: blocks to replace at later ticks, by tick.
+    """
 
     name = f"{NAME}.breakages"
     outputs = ()
@@ -106,7 +111,8 @@ class PropellerFailures:
         self._steps = {tick: tuple(events) for tick, events in groupby(plant.events, lambda event: event.tick)}
         self._form = multirotor_euler if plant.euler else multirotor_multibody
         self._core, self._bodies = plant.core, plant.bodies
-        self._blocks: dict[int, list[tuple[Block, BoundBlock]]] = {}  # replacements by tick
+        self.events = [tick + 1 for tick in self._steps]
+        self.replacements: dict[int, list[tuple[Block, BoundBlock]]] = {}
 
     def bind(self, graph: BlockDiagram) -> None:
         """Compile the plants of all failures before the first tick."""
@@ -118,8 +124,8 @@ class PropellerFailures:
                 failures.append(Failure(event.time, p, event.becomes == "locked"))
             failing, core = FailingMultirotorPlant(core, tuple(failures)), core._replace(vehicle=p)
             view = self._bodies._replace(vehicle=p)
-            self._blocks[tick + 2] = [self._prepare(NAME, core)]
-            self._blocks[tick + 1] = [self._prepare(NAME, failing), self._prepare(f"{NAME}.bodies", view)]
+            self.replacements[tick + 2] = [self._prepare(NAME, core)]
+            self.replacements[tick + 1] = [self._prepare(NAME, failing), self._prepare(f"{NAME}.bodies", view)]
 
     def _prepare(self, name: str, parameters: Any) -> tuple[Block, BoundBlock]:
         part = replace(self._graph.part(name), parameters=parameters)
@@ -130,6 +136,6 @@ class PropellerFailures:
 
         The plant of a step starts from the state that has been output.
         """
-        for block, code in self._blocks.pop(tick, []):
+        for block, code in self.replacements.pop(tick, []):
             self._graph.replace(block, code)
-        return min(self._blocks, default=NEVER)
+        return min(self.replacements, default=NEVER)

@@ -102,6 +102,7 @@ ELSEWHERE = {  # other tests by option; a test's file contains the option
         "--ros2-router": "tests/services/ros2/test_service.py",
     },
     "autopilot": dict.fromkeys(("--px4-sim", "--set", "--log"), "tests/services/px4/test_simulator.py"),
+    "check": {"--allow-code": "tests/services/fmu/test_import.py"},
     "campaign": {
         "--cluster": "tests/studies/campaign/test_cluster.py",
         "--allow-code": "tests/services/fmu/test_effect_inputs.py",

@@ -5,12 +5,13 @@ FMPy finds no fault in it, nor in its description for FMI 2.0.
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from recorded_ports import DrivenService, RecordedPorts, scene_config
 
 pytest.importorskip("fmpy")
 from driven_fmu import assert_recorded_outputs
-from fmpy import read_model_description
+from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
 from lapwing.fmi.exported_part import PARTS, VEHICLE, ExportedPart
@@ -20,6 +21,16 @@ from lapwing.fmi.variables import variables_of
 
 FIRMWARE = {"ardupilot_quad", "betaflight_quad", "px4_quad"}
 SCENES = sorted(path.stem for path in Path("lapwing/scenes").glob("*.toml"))
+MODELS = [
+    "delivery_full",
+    "hexacopter_tilted",
+    "carried_load",
+    "cooperative_load",
+    "gyrostat_chaotic",
+    "os4_motors",
+    "slung_load",
+    "unload",
+]  # a scene of each model of the plant; tests/fmi/test_propeller_failures.py has that of five bodies
 TICKS = 60
 
 
@@ -46,6 +57,23 @@ def test_parts_have_recorded_outputs(scene: str, tmp_path: Path) -> None:
         assert validate_fmu(str(tmp_path / "part.fmu")) == []
         assert_valid_for_fmi_2(exported, tmp_path / "modelDescription.xml")
         assert_recorded_outputs(tmp_path / "part.fmu", exported, ports)
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("scene", MODELS)
+def test_plant_for_fmi_2_has_outputs_of_fmi_3(scene: str, tmp_path: Path) -> None:
+    """FMPy validates both and simulates them with the start values of their inputs."""
+    setup, results = scene_config(scene), []
+    for version in (2, 3):
+        path = tmp_path / f"plant_{version}.fmu"
+        names = [v.name for v in variables_of(export_fmu(setup, "plant", path, version)) if v.causality == "output"]
+        assert validate_fmu(str(path)) == []
+        stop = TICKS * setup.interval
+        results.append(simulate_fmu(str(path), output=names, stop_time=stop, output_interval=setup.interval))
+    a, b = results
+    assert len(a) == len(b) == TICKS + 1
+    for name in a.dtype.names:
+        assert np.array_equal(a[name].astype(float), b[name].astype(float), equal_nan=True), name
 
 
 @pytest.mark.parametrize("scene", sorted(FIRMWARE))

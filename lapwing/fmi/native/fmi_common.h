@@ -106,7 +106,14 @@ static double contacts(const instance *self) {
     return sum;
 }
 
-/* Step to the end of a communication step. *event: a ground contact changed, and the step may end early. */
+static int is_failure(int64_t tick) {
+    for (size_t k = 0; k < FAILURES; k++)
+        if (part_failures[k] == tick) return 1;
+    return 0;
+}
+
+/* Step to the end of a communication step. *event: a ground contact changed or a propeller failed, and the step may end
+   early. */
 static int step_to(instance *self, double from, double step, int *event) {
     if (self->mode != STEP) return fail(self, "doStep: not in step mode; initialise the instance first");
     if (!(step >= 0) || !isfinite(from) || !isfinite(step) || step > 1e9)
@@ -118,7 +125,7 @@ static int step_to(instance *self, double from, double step, int *event) {
     while (STATE(self->memory)->tick < last) {
         if (advance_one(self) != OK) return ERROR;
         self->time = self->start + STATE(self->memory)->tick * PART_INTERVAL;
-        if (event && contacts(self) != before) {
+        if (event && (is_failure(STATE(self->memory)->tick) || contacts(self) != before)) {
             *event = 1;
             if (STATE(self->memory)->tick < last && self->early_return) return OK;
         }

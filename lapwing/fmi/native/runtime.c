@@ -84,6 +84,7 @@ int part_advance(void *memory) {
     }
     for (int64_t k = 0; k < BLOCKS; k++) {
         const block *b = &part_blocks[k];
+        while (b->until <= tick) b = &part_blocks[b->following];
         if (!b->step) {
             act(memory, tick, k, woken == b->vehicle);
             continue;

@@ -18,6 +18,7 @@ typedef struct {
     int64_t cell;        /* offset in the image */
     int64_t every;       /* [ticks] */
     int64_t vehicle;
+    int64_t until, following; /* first tick of its replacement, after a propeller failure, and index of that block */
 } block;
 
 typedef struct {

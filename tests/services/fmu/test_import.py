@@ -100,6 +100,23 @@ def test_gain_changes_flight_and_resimulation_repeats_it(folder: Path, plain_log
 
 
 @pytest.mark.long
+def test_accuracy_is_measured_with_permission(folder: Path) -> None:
+    """`check --accuracy` of a scene and of its log."""
+    scene, log = scene_with(folder), folder / "checked.mcap"
+    done = fly(scene, log)
+    assert done.returncode == 0, done.stderr
+    short = "--set", "run.duration=1.0"
+    for arguments in ((str(log),), (str(scene), *short)):
+        command = "check", *arguments, "--accuracy", "--set", "solver.accuracy=1e-2"
+        done = run_command(*command)
+        assert done.returncode == 2
+        assert "use --allow-code to run" in done.stderr
+        assert done.stderr.count("\n") == 1
+        done = run_command(*command, "--allow-code")
+        assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.long
 def test_changed_fmu_is_rejected_by_resimulation(folder: Path, tmp_path: Path) -> None:
     write_small_fmu(tmp_path / "small.fmu")
     log = tmp_path / "a.mcap"

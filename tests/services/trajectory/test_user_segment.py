@@ -28,6 +28,8 @@ class Line(Segment):
         return [Piece(duration, (start, (self.to - start) / duration))]
 '''
 
+ACCURACY = [sys.executable, "-m", "lapwing", "check", "log.mcap", "--accuracy", "--set", "solver.accuracy=1e-2"]
+
 
 def scene(folder, module=MODULE, name="line", **keys):
     (folder / "line.py").write_text(module)
@@ -73,10 +75,16 @@ def test_command_resimulates_user_segment_from_log_alone(tmp_path):
     for command in (
         [*run, "--set", phases, "--set", "run.duration=0.5"],
         [sys.executable, "-m", "lapwing", "resimulate", "log.mcap", "--allow-code"],
+        [*ACCURACY, "--allow-code"],
     ):
         done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=600, check=False)
         assert done.returncode == 0, done.stderr
         (tmp_path / "line.py").unlink(missing_ok=True)
+    done = subprocess.run(ACCURACY, cwd=tmp_path, capture_output=True, text=True, timeout=600, check=False)
+    assert done.returncode == 2
+    assert done.stderr.endswith(
+        "contains code of its author (modules.line.py); read it, then use --allow-code to run it\n"
+    )
 
 
 def test_schema_accepts_user_segment(tmp_path):

@@ -1,0 +1,162 @@
+"""Exported plants whose propellers fail in flight (`[multibody.event]`): the failures have the bits of the run."""
+
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from recorded_ports import RecordedPorts, scene_config
+from test_library import built
+
+fmpy = pytest.importorskip("fmpy")
+from driven_fmu import Slave, assert_recorded_outputs  # noqa: E402
+from fmpy import simulate_fmu  # noqa: E402
+from fmpy.validation import validate_fmu  # noqa: E402
+
+from lapwing.cosim.config.run_config import RunConfig  # noqa: E402
+from lapwing.fmi.exported_part import export_part  # noqa: E402
+from lapwing.fmi.fmu import export_fmu  # noqa: E402
+
+pytestmark = pytest.mark.long
+LOCKED, FREE = '{time=2.601, propeller=2, failure="locked"}', '{time=2.602, propeller=1, failure="free"}'
+TORN_OFF = '{time=2.605, propeller=4, failure="torn_off"}'  # in the tick after that of the others
+FAILURES = f"[{LOCKED}, {FREE}, {TORN_OFF}]"
+SCENE = {"vehicle.model": "multibody", "run.duration": 3.6, "success.require": "[]"}  # it falls from 1 m
+TICK, FIRST, SECOND = 0.004, 2.604, 2.608  # [s]; ends of the ticks in which propellers fail
+SPEED = "truth.rotor_speed"
+
+
+def setup_of(**overrides: object) -> RunConfig:
+    return scene_config("delivery_mission", **SCENE, **{"multibody.event": FAILURES, **overrides})
+
+
+@pytest.fixture(scope="module")
+def vehicle(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """FMI 3.0, from the command."""
+    path = tmp_path_factory.mktemp("fmu") / "vehicle.fmu"
+    settings = [f"--set={key}={value}" for key, value in {**SCENE, "multibody.event": FAILURES}.items()]
+    command = [sys.executable, "-m", "lapwing", "export-fmu", "delivery_mission", "--part", "vehicle", *settings]
+    done = subprocess.run([*command, "--out", str(path)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert validate_fmu(str(path)) == []
+    return path
+
+
+def begun(path: Path, **options: bool) -> Slave:
+    a = Slave(path, **options)
+    a.begin()
+    if options:
+        a.fmu.enterStepMode()
+    return a
+
+
+def height_and_speeds(a: Slave) -> list[float]:
+    return [a.get(name) for name in ("truth.position_world[2]", *(f"{SPEED}[{k}]" for k in range(4)))]
+
+
+def stepped(a: Slave, ticks: int) -> list[list[float]]:
+    result = []
+    for _ in range(ticks):
+        a.step(TICK)
+        result.append(height_and_speeds(a))
+    return result
+
+
+@pytest.mark.parametrize("part", ["plant", "vehicle"])
+def test_part_has_recorded_outputs(part: str, tmp_path: Path) -> None:
+    recorded = RecordedPorts(setup_of())
+    exported = export_fmu(recorded.setup, part, tmp_path / "part.fmu")
+    assert_recorded_outputs(tmp_path / "part.fmu", exported, recorded)
+    intact = RecordedPorts(setup_of(**{"multibody.event": "[]"}))
+    equal = [np.array_equal(recorded.latest("truth", k), intact.latest("truth", k)) for k in range(recorded.ticks)]
+    assert equal == [k * TICK < FIRST - TICK / 2 for k in range(recorded.ticks)]
+
+
+def test_euler_angles_are_rejected(tmp_path: Path) -> None:
+    with pytest.raises(ValueError, match="plant: allocates memory"):
+        export_fmu(setup_of(**{"multibody.coordinates": "euler"}), "plant", tmp_path / "plant.fmu")
+
+
+def test_fmi_2_has_recorded_outputs(tmp_path: Path) -> None:
+    recorded = RecordedPorts(setup_of())
+    path = tmp_path / "vehicle.fmu"
+    export_fmu(recorded.setup, "vehicle", path, 2)
+    assert validate_fmu(str(path)) == []
+    names = [f"{SPEED}[{k}]" for k in range(4)]
+    result = simulate_fmu(str(path), output=names, stop_time=(recorded.ticks - 1) * TICK, output_interval=TICK)
+    speeds = np.array([result[name] for name in names]).T
+    column = [v.name for v in fmpy.read_model_description(str(path)).modelVariables if v.name.startswith("truth.")]
+    first = column.index(names[0])
+    assert np.array_equal(speeds, [recorded.latest("truth", k)[first : first + 4] for k in range(recorded.ticks)])
+
+
+@pytest.mark.parametrize("part", ["plant", "vehicle"])
+def test_library_has_recorded_outputs(part: str, tmp_path: Path) -> None:
+    native, recorded = built(tmp_path, "delivery_mission", part, **SCENE, **{"multibody.event": FAILURES})
+    native.compare(recorded, 0, recorded.ticks)
+    assert native.call("missed")(native.instance) == 0
+
+
+def test_vehicle_of_fleet_fails_alone(tmp_path: Path) -> None:
+    failing = {"vehicle.0.model": "multibody", "vehicle.0.multibody.event": FAILURES}
+    native, recorded = built(tmp_path, "fleet", "plant", **failing, **{"run.duration": 2.8, "success.require": "[]"})
+    native.compare(recorded, 0, recorded.ticks)
+
+
+def test_step_ends_early_at_each_failure(vehicle: Path) -> None:
+    a = begun(vehicle, eventModeUsed=True, earlyReturnAllowed=True)
+    times, reached, end = [], 0.0, 2.7
+    while reached < end:
+        event, terminate, early, reached = a.fmu.doStep(reached, end - reached)
+        assert event == early
+        assert not terminate
+        if event:
+            times.append(reached)
+            a.fmu.enterEventMode()
+            a.fmu.updateDiscreteStates()
+            a.fmu.enterStepMode()
+        if reached == pytest.approx(FIRST):
+            assert a.get(f"{SPEED}[1]") == pytest.approx(0.0, abs=1e-9)
+            assert a.get(f"{SPEED}[3]") > 100.0
+    assert [t for t in times if t > 2.5] == pytest.approx([FIRST, SECOND])  # before: the take-off
+    assert a.get(f"{SPEED}[3]") == 0.0
+    a.close()
+
+
+def test_step_reports_failure_without_early_return(vehicle: Path) -> None:
+    a, b = begun(vehicle), begun(vehicle, eventModeUsed=True, earlyReturnAllowed=False)
+    expected = stepped(a, 675)
+    b.fmu.doStep(0.0, 2.6)
+    event, _, early, reached = b.fmu.doStep(2.6, 0.1)
+    assert (event, early, reached) == (True, False, 2.7)
+    assert height_and_speeds(b) == expected[-1]
+    for each in (a, b):
+        each.close()
+
+
+def test_saved_states_continue_before_and_after_failure(vehicle: Path) -> None:
+    """The state does not depend on the failures that its instance has had."""
+    a = begun(vehicle)
+    stepped(a, 640)
+    before = a.saved()
+    first = stepped(a, 11)  # to the tick of the first failures
+    between = a.saved()
+    rest = stepped(a, 40)
+    fresh = begun(vehicle)
+    fresh.load(between)
+    assert fresh.saved() == between
+    fresh.time = 651 * TICK
+    assert stepped(fresh, 40) == rest
+    for each in (a, fresh):  # back to intact propellers
+        each.load(before)
+        each.time = 640 * TICK
+        assert stepped(each, 51) == first + rest
+        each.close()
+
+
+def test_parameters_after_failure_have_their_own_names() -> None:
+    part = export_part(setup_of(), "plant")
+    names = {leaf.path.partition("|")[0] for leaf in part.image.leaves}
+    assert {"plant", "plant.from_tick_651", "plant.from_tick_652", "plant.from_tick_653"} <= names
+    assert part.events == [651, 652]
