@@ -183,6 +183,23 @@ _PX4_GAINS = (
 )
 
 
+_GRIPPER = Parameter("PD_GRIPPER_EN", "", 1, 0, 1, "1: DO_GRIPPER and mission items release the payload", True)
+
+
+def _equipment(scene: "Scene") -> list[Parameter]:
+    """Return the parameters of fitted sensors and of the payload. Without sensors the true state replaces them."""
+    sensors = scene.tables("sensors")
+    mag, baro, gps = (float(not sensors or name in sensors) for name in ("magnetometer", "barometer", "gps"))
+    distance = float(len({"sonar", "rangefinder"} & set(sensors)))
+    return [
+        Parameter("SYS_HAS_MAG", "", mag, 0, mag, "0: arming requires no readings of the magnetometer", True),
+        Parameter("SYS_HAS_BARO", "", baro, 0, baro, "0: arming requires no readings of the barometer", True),
+        Parameter("SYS_HAS_NUM_DIST", "", distance, 0, distance, "0: arming requires no distance readings", True),
+        Parameter("SYS_HAS_GPS", "", gps, 0, gps, "0: the autopilot gets no GPS readings, from the start", True, True),
+        *([_GRIPPER] if "payload_release" in scene.tables("effects") else ()),
+    ]
+
+
 def table(scene: "Scene") -> dict[str, Parameter]:
     """Return the parameters of a scene with an `[autopilot]` by name, with the scene's defaults.
 
@@ -195,7 +212,7 @@ def table(scene: "Scene") -> dict[str, Parameter]:
 def _table(scene: "Scene") -> dict[str, Parameter]:
     px4 = scene.lookup("autopilot.controller") == PX4_CASCADE
     gains = _PX4_GAINS if px4 else gain_parameters(scene.section("gains"))
-    parameters = {p.name: p for p in (*gains, *_FLIGHT, *_FAILSAFES)}
+    parameters = {p.name: p for p in (*gains, *_FLIGHT, *_FAILSAFES, *_equipment(scene))}
     for name, value in scene.lookup("autopilot.parameters").items():
         if name not in parameters:
             raise ConfigError.unknown(f"autopilot.parameters.{name}", "parameter", name, parameters)

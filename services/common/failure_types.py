@@ -34,10 +34,16 @@ class Faults(NamedTuple):
 SATELLITES, FIX_SATELLITES = "SIM_GPS_USED", 4  # parameter, and its minimum with a fix, as in PX4
 
 
-def with_satellites(faults: Faults, values: Mapping[str, float]) -> Faults:
-    """Return the failures with GPS off if the parameter SIM_GPS_USED selects too few satellites for a fix."""
+def with_satellites(faults: Faults, values: Mapping[str, float], has_gps: bool) -> Faults:
+    """Return the failures with GPS off if the parameters leave no fix.
+
+    Args:
+        faults: injected failures.
+        values: parameters; SIM_GPS_USED may select too few satellites for a fix.
+        has_gps: value of SYS_HAS_GPS at the start.
+    """
     enough = values.get(SATELLITES, FIX_SATELLITES) >= FIX_SATELLITES  # absent from former logs
-    return faults if enough else faults._replace(gps=OFF)
+    return faults if enough and has_gps else faults._replace(gps=OFF)
 
 
 def supported_types(unit: str) -> tuple[int, ...]:

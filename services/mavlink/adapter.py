@@ -1,5 +1,6 @@
 """MAVLink adapter without sockets: converts between bytes of endpoints and messages and commands of the vehicle."""
 
+import math
 from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
@@ -16,6 +17,7 @@ from lapwing.services.mavlink.endpoint import Endpoint
 from lapwing.services.mavlink.mission_store import MissionStore
 from lapwing.services.mavlink.parameter_store import ParameterStore
 from lapwing.services.mavlink.protocols import handlers
+from lapwing.services.mavlink.px4_facts import COMPONENT_ID, SYSTEM_ID
 from lapwing.services.mavlink.session import Session
 from lapwing.services.mavlink.setpoint_keeper import SetpointKeeper
 from lapwing.services.mavlink.signing import Signature, TimeStampStore
@@ -26,7 +28,6 @@ from lapwing.services.mavlink.vehicle_description import VehicleDescription
 SECOND = 1_000_000_000
 LINK_TIMEOUT = 3.5  # [s] after its last heartbeat, a ground station counts as lost
 HEARTBEAT_INTERVAL = 1.0  # [s]
-COMPONENT = mavlink.MAV_COMP_ID_AUTOPILOT1
 ALL = 0  # target system or component of a message for all receivers
 EMPTY_SIZES = {  # [bytes] of messages without content
     COMMAND_ACKS: len(CommandAcks(header(0, "world")).encode()),
@@ -77,6 +78,7 @@ class Adapter:
         self.signature = Signature(key, store) if key else None
         self._insecure, self._log = insecure, log
         self._announcements = Announcements(self.vehicle, self.broadcast)
+        self._restart_requested = False
         self._next_link = 0
         self._next_heartbeat = 0.0  # [s] wall time, before the first message of the vehicle
 
@@ -89,9 +91,14 @@ class Adapter:
             put: sends bytes to it.
             strict: True to ignore it if its first bytes are not MAVLink.
         """
-        channel = Channel(self.vehicle.description.system_id, self.signature, datagrams, self.counts, strict)
+        channel = Channel(self.vehicle.system, self.signature, datagrams, self.counts, strict)
         endpoint = Endpoint(channel, local, put)
-        self.sessions[endpoint] = Session(
+        endpoint.set_source(self.vehicle.system, self.vehicle.component)
+        self.sessions[endpoint] = self._session(endpoint)
+        return endpoint
+
+    def _session(self, endpoint: Endpoint) -> Session:
+        return Session(
             endpoint,
             self.vehicle,
             self.clock,
@@ -103,8 +110,8 @@ class Adapter:
             self.counts,
             self._log,
             self.trusts,
+            self._request_restart,
         )
-        return endpoint
 
     def disconnect(self, endpoint: Endpoint) -> None:
         """Remove an endpoint."""
@@ -135,13 +142,13 @@ class Adapter:
         return valid
 
     def _dispatch(self, endpoint: Endpoint, m: Any) -> None:
-        system = self.vehicle.description.system_id
+        address = self.vehicle.system, self.vehicle.component
         source = m.get_srcSystem(), m.get_srcComponent()
         target = getattr(m, "target_system", getattr(m, "target", ALL))
         component = getattr(m, "target_component", ALL)
-        if source == (system, COMPONENT):
+        if source == address:
             self.counts["with the address of the vehicle"] += 1
-        elif target not in (ALL, system) or component not in (ALL, COMPONENT):
+        elif target not in (ALL, address[0]) or component not in (ALL, address[1]):
             self.counts["for another vehicle"] += 1
         elif (handler := handlers().get(m.get_msgId())) is None:
             self.counts["unhandled message"] += 1
@@ -184,6 +191,7 @@ class Adapter:
         """Advance the wall time [s]. Send heartbeats until the vehicle publishes its first message."""
         self.clock.now = Instant(self.clock.now.time_ns, wall)
         if not self.commands.started:
+            self._restart_if_requested()
             self.parameters.step()
             if wall >= self._next_heartbeat:
                 self._next_heartbeat = wall + HEARTBEAT_INTERVAL
@@ -199,7 +207,27 @@ class Adapter:
         for endpoint in self.sessions:
             endpoint.send(message)
 
+    def _request_restart(self) -> None:
+        self._restart_requested = True
+
+    def _restart_if_requested(self) -> None:
+        """Take the address of the parameters, and start new conversations."""
+        if not self._restart_requested:
+            return
+        self._restart_requested = False
+        system, component = (self.parameters.value(name) for name in (SYSTEM_ID, COMPONENT_ID))
+        if not math.isnan(system):  # ArduPilot's are named differently
+            self.vehicle.system, self.vehicle.component = int(system), int(component)
+            if self.signature:
+                self.signature.set_system(self.vehicle.system)
+        for endpoint in self.sessions:
+            endpoint.set_source(self.vehicle.system, self.vehicle.component)
+            self.parameters.forget(endpoint)
+            self.missions.forget(endpoint)
+            self.sessions[endpoint] = self._session(endpoint)
+
     def _step(self) -> None:
+        self._restart_if_requested()
         built: dict[int, list[Any]] = {}
         for endpoint, session in self.sessions.items():
             endpoint.send(*session.schedule.due(built), *session.log.step())

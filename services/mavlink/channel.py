@@ -40,7 +40,7 @@ class Channel:
         """Create the channel.
 
         Args:
-            system: system id of the vehicle, which sends as its autopilot, component 1.
+            system: system id of the vehicle, which sends as its autopilot, component 1, until `set_source`.
             signature: signs and checks frames; None for no signing.
             datagrams: True if no frame continues from one piece of bytes to the next.
             counts: rejected messages by reason.
@@ -54,6 +54,10 @@ class Channel:
         self._datagrams, self._counts = datagrams, counts
         self._framed = not strict  # a frame was received, signed or not
         self.foreign = False  # the first bytes were not a frame
+
+    def set_source(self, system: int, component: int) -> None:
+        """Set the source of further frames."""
+        self._codec.srcSystem, self._codec.srcComponent = system, component
 
     def encode(self, message: Any) -> bytes:
         """Return the next frame of a message or `Numbers`. Return no bytes, and count it, if a value does not fit."""

@@ -14,8 +14,8 @@ from lapwing.services.mavlink.firmware import Firmware
 from lapwing.services.mavlink.px4_facts import Fact
 from lapwing.services.mavlink.vehicle_description import VehicleDescription
 
-TYPE_MISMATCH = 7  # MAV_PARAM_ERROR that pymavlink lacks
-BY_NAME = -1  # index of a request by name
+TYPE_MISMATCH, WRITE_FAIL = 7, 9  # MAV_PARAM_ERROR that pymavlink lacks
+BY_NAME = -1  # index of a request by name; PX4 accepts any negative one
 MAX_PER_STEP = 20  # values of a list sent to one endpoint at each step of the telemetry
 
 
@@ -92,8 +92,8 @@ class ParameterStore:
 
     def read(self, endpoint: Endpoint, name: str, index: int) -> None:
         """Send one parameter, by its name or its index."""
-        if index != BY_NAME:
-            name = self.names[index] if 0 <= index < len(self.names) else ""
+        if index >= 0:
+            name = self.names[index] if index < len(self.names) else ""
         if name in self._number:
             self._send(endpoint, name)
         else:
@@ -119,7 +119,9 @@ class ParameterStore:
             if acknowledgement.result == mavlink.MAV_RESULT_ACCEPTED:
                 self._change(name, acknowledgement.value)
             else:
-                self._reject(endpoint, name, BY_NAME, mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
+                is_invalid = acknowledgement.result == mavlink.MAV_RESULT_DENIED  # otherwise it is starting or busy
+                error = mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE if is_invalid else WRITE_FAIL
+                self._reject(endpoint, name, BY_NAME, error)
                 self._send(endpoint, name)
 
         if not trusted:
@@ -136,6 +138,9 @@ class ParameterStore:
         set_value = self._firmware.param_value(value, fact.whole)
         counterparts = fact.assign(set_value) if fact.assign and math.isfinite(set_value) else None
         error = None
+        if fact.assign is None and set_value == fact.value(self._values):
+            self._send(endpoint, fact.name)  # as PX4 acknowledges its present value
+            return
         if fact.assign is None:
             error = mavlink.MAV_PARAM_ERROR_READ_ONLY
         elif not trusted:

@@ -4,7 +4,7 @@ Names and values are those of PX4's parameter reference. A PX4 parameter may cor
 autopilot, its counterparts. Setting a PX4 parameter sets its counterparts.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from typing import NamedTuple
 
 from lapwing.services.common.mavlink.dialect import mavlink
@@ -35,6 +35,20 @@ def _translate_action(name: str, counterpart: str, actions: dict[int, int], defa
     return Fact(name, lambda v: px4_actions.get(int(v.get(counterpart, NOTHING)), default), assign=assign)
 
 
+def _setting(name: str, default: int, allowed: Collection[int]) -> Fact:
+    """Return a setting of the link, which has no counterpart in the autopilot."""
+    return Fact(name, lambda _: float(default), assign=lambda x: {} if x in allowed else None)
+
+
+SYSTEM_ID, COMPONENT_ID, TYPE = "MAV_SYS_ID", "MAV_COMP_ID", "MAV_TYPE"
+PRESSURE_OFFSET = "SENS_DPRES_OFF"  # of the airspeed sensor, subtracted from its readings
+_IDS = range(1, 251)  # PX4's bounds
+_MULTIROTORS = (  # MAV_TYPE that PX4 accepts and flies as a multirotor
+    mavlink.MAV_TYPE_QUADROTOR,
+    mavlink.MAV_TYPE_HEXAROTOR,
+    mavlink.MAV_TYPE_OCTOROTOR,
+    mavlink.MAV_TYPE_TRICOPTER,
+)
 SIM_IMU, SIM_MAG = 1310988, 197388  # device ids of simulated sensors: they need no calibration
 GENERIC_FRAMES = {4: 4001, 6: 6001, 8: 8001}  # SYS_AUTOSTART of 4, 6 and 8 rotors in X
 LOGGED_FROM_BOOT_TO_SHUTDOWN = 2  # SDLOG_MODE
@@ -71,16 +85,9 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
         return int(not d.sensors or sensor in d.sensors)  # without sensors the ground truth replaces all of them
 
     whole = {
-        "MAV_SYS_ID": d.system_id,
-        "MAV_COMP_ID": mavlink.MAV_COMP_ID_AUTOPILOT1,
-        "MAV_TYPE": vehicle_type(len(d.rotors)),
         "SYS_AUTOSTART": GENERIC_FRAMES.get(len(d.rotors), GENERIC_FRAMES[4]),
         "SYS_HITL": 0,
-        "SYS_HAS_MAG": is_fitted("magnetometer"),
-        "SYS_HAS_BARO": is_fitted("barometer"),
-        "SYS_HAS_GPS": is_fitted("gps"),
         "SYS_HAS_NUM_ASPD": int("airspeed" in d.sensors),
-        "SYS_HAS_NUM_DIST": len({"sonar", "rangefinder"} & set(d.sensors)),
         "CAL_GYRO0_ID": SIM_IMU * is_fitted("imu"),
         "CAL_ACC0_ID": SIM_IMU * is_fitted("imu"),
         "CAL_MAG0_ID": SIM_MAG * is_fitted("magnetometer"),
@@ -91,7 +98,7 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
         "RC_CHAN_CNT": 0,
         "COM_OBS_AVOID": 0,
         "SDLOG_MODE": LOGGED_FROM_BOOT_TO_SHUTDOWN,
-        "PD_GRIPPER_EN": int(d.gripper),
+        **({} if d.gripper else {"PD_GRIPPER_EN": 0}),
         "CA_AIRFRAME": MULTIROTOR,
         "CA_ROTOR_COUNT": len(d.rotors),
         "BAT1_SOURCE": _POWER_MODULE if d.battery else _NO_SOURCE,
@@ -102,7 +109,11 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
     }
     whole |= {f"COM_FLTMODE{slot}": -1 for slot in range(1, 7)}
     whole |= {output_function(k + 1): FIRST_MOTOR + k for k in range(len(d.rotors))}
+    own_type = vehicle_type(len(d.rotors))
     return [
+        _setting(SYSTEM_ID, d.system_id, _IDS),
+        _setting(COMPONENT_ID, mavlink.MAV_COMP_ID_AUTOPILOT1, _IDS),
+        _setting(TYPE, own_type, {own_type, *_MULTIROTORS}),
         *[Fact(name, lambda _, value=value: float(value)) for name, value in whole.items()],  # type: ignore[misc]
         *[Fact(f"SENS_BOARD_{axis}_OFF", lambda _: 0.0, False, "deg") for axis in "XYZ"],
         *(_battery(d.battery) if d.battery else ()),
@@ -113,7 +124,7 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
         # VTOL aircraft in forward flight only need an approach to their landing, as in PX4
         Fact("RTL_APPR_FORCE", lambda _: 0.0, assign=lambda x: {} if x in (0.0, 1.0) else None),
         Fact("CP_DIST", lambda _: NO_COLLISION_PREVENTION, False, "m"),
-        Fact("SENS_DPRES_OFF", lambda _: 0.0, False, "Pa"),
+        Fact(PRESSURE_OFFSET, lambda _: 0.0, False, "Pa", assign=lambda x: {}),
     ]
 
 

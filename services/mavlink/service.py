@@ -8,6 +8,7 @@ ten per second, which wait for the next estimate.
 import time
 from collections.abc import Mapping
 from contextlib import ExitStack
+from operator import itemgetter
 from pathlib import Path
 from typing import Any
 
@@ -106,18 +107,30 @@ def _open_servers(process: Participant, spec: Any, stack: ExitStack) -> dict[str
 
 
 def _handle_log_packet(servers: Mapping[str, LinkServer], payload: bytes, immediate: bool, interval_ns: int) -> None:
-    """Handle all commands, acknowledgements and statuses of a log packet, and the newest message of other topics."""
+    """Handle all commands, acknowledgements and statuses of a log packet, and the newest message of other topics.
+
+    A page has messages of equal length, so a topic whose messages vary in length has several, which overlap in time.
+    """
     *_, pages = unpack_log_packet(payload)
+    ordered = []  # (tick, True for an estimate, which comes last, server, topic, payload)
+    newest: dict[Any, int] = {}  # tick by topic
     for page in pages:
         topic = template_topic(page.topic)
         if topic is ESTIMATE and immediate:
             continue
         if page.payloads.shape[1] <= EMPTY_SIZES.get(topic, 0):
             continue
-        all_messages = topic in ALL
-        for server in [servers[page.topic.vehicle]] if page.topic.vehicle else servers.values():
-            if not all_messages:
+        page_servers = [servers[page.topic.vehicle]] if page.topic.vehicle else servers.values()
+        if topic in ALL:
+            for server in page_servers:
+                ordered += [
+                    (int(tick), topic is ESTIMATE, server, topic, row)
+                    for tick, row in zip(page.ticks, page.payloads, strict=True)
+                ]
+        elif page.ticks[-1] >= newest.get(page.topic, -1):
+            newest[page.topic] = int(page.ticks[-1])
+            for server in page_servers:
                 server.adapter.vehicle.put(topic, page.payloads[-1].tobytes())
-                continue
-            for i in range(len(page.ticks)):
-                server.handle(topic, int(page.ticks[i]) * interval_ns, page.payloads[i].tobytes())
+    ordered.sort(key=itemgetter(0, 1))
+    for tick, _, server, topic, row in ordered:
+        server.handle(topic, tick * interval_ns, row.tobytes())

@@ -38,6 +38,7 @@ class Session:
         counts: Counter[str],
         log: Path | None,
         trusts: Callable[[Endpoint], bool],
+        restart: Callable[[], None],
     ):
         """Start a conversation.
 
@@ -53,13 +54,14 @@ class Session:
             counts: rejected messages by reason.
             log: log of the run, or None.
             trusts: returns True if commands of an endpoint are accepted.
+            restart: restarts the link after the present message.
         """
         self.endpoint, self.vehicle, self.clock = endpoint, vehicle, clock
         self.parameters, self.missions, self._setpoints, self._sticks = parameters, missions, setpoints, sticks
         self.schedule = Schedule(vehicle)
         self.log = LogServer(log)
         self.files = FileServer(files(vehicle.description))
-        self._commands, self._counts, self._trusts = commands, counts, trusts
+        self._commands, self._counts, self._trusts, self.restart = commands, counts, trusts, restart
         self._sent_texts: dict[str, Instant] = {}
 
     @property

@@ -77,6 +77,10 @@ class TimeStampStore:
                 "that can be written"
             ) from None
 
+    def set_system(self, system: int) -> None:
+        """Use the streams of another system id of the vehicle."""
+        self._owner = self._owner[0], system
+
     def load(self) -> dict[Stream, int]:
         """Return the newest time stamp by stream."""
         rows = self._database.execute(
@@ -118,6 +122,16 @@ class Signature:
         """Store the time stamp of the frame of a stream that has just been accepted."""
         if self._store:
             self._store.put(stream, self.state.stream_timestamps[stream])
+
+    def set_system(self, system: int) -> None:
+        """Store the time stamps under another system id of the vehicle, so that frames cannot be replayed to it."""
+        if self._store:
+            times = self.state.stream_timestamps
+            self._store.set_system(system)
+            for stream, time_stamp in self._store.load().items():
+                times[stream] = max(time_stamp, times.get(stream, 0))
+            for stream, time_stamp in times.items():
+                self._store.put(stream, time_stamp)
 
     def close(self) -> None:
         """Close the store."""

@@ -8,6 +8,7 @@ from lapwing.dynamics.geodesy import Home
 from lapwing.dynamics.vector import Vec3
 from lapwing.messages import Status, nanoseconds
 from lapwing.messages.topics import ESTIMATE, STATUS, TRUTH, Topic
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.mavlink.frames import Quaternion, saturate, swap_attitude
 from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.mavlink import firmware
@@ -63,6 +64,7 @@ class VehicleCache:
         """Create the cache of a vehicle that has published nothing yet."""
         self.description = description
         self.firmware = firmware.get(description.firmware)
+        self.system, self.component = description.system_id, mavlink.MAV_COMP_ID_AUTOPILOT1  # present address
         self.time_ns = 0
         self.flight = FlightTimes()
         self.events = EventLog()

@@ -162,7 +162,7 @@ def parameter(context: Context, command: Any) -> None:
     parameters[definition.name] = requested
     context.outbox.parameters = dict(parameters)
     if definition.name == SATELLITES:
-        context.outbox.faults = with_satellites(context.state.faults, parameters)
+        context.outbox.faults = with_satellites(context.state.faults, parameters, context.constants.has_gps)
 
 
 @handles("finish")

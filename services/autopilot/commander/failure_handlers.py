@@ -39,7 +39,7 @@ def inject_failure(context: Context, command: Any) -> None:
     else:
         changes = {unit: kind, "battery_charge": _low_charge(state.guidance.parameters)}
     state.faults = state.faults._replace(**changes)
-    outbox.faults = with_satellites(state.faults, state.guidance.parameters)
+    outbox.faults = with_satellites(state.faults, state.guidance.parameters, constants.has_gps)
     outbox.send_text(f"injected: {unit}{instances} {KINDS[kind]}")
 
 

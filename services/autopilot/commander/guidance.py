@@ -12,6 +12,7 @@ from lapwing.services.autopilot.commander.smoothing import Limits, PositionSmoot
 from lapwing.services.common.ports import Setpoint
 
 STICK_DEADZONE = 0.05
+GRIPPER = "PD_GRIPPER_EN"
 _WITHOUT_STICKS = (0, 4)  # COM_RC_IN_MODE: radio only, disabled
 
 
@@ -105,6 +106,11 @@ class Guidance:
     def offboard_available(self) -> bool:
         """True if offboard setpoints are recent."""
         return self.inputs.offboard_age < self.parameters["COM_OF_LOSS_T"]
+
+    @property
+    def has_gripper(self) -> bool:
+        """True if the gripper is enabled."""
+        return self.parameters.get(GRIPPER, 1.0) != 0.0  # not in logs of former versions
 
     @property
     def uses_sticks(self) -> bool:

@@ -7,6 +7,7 @@ from lapwing.services.autopilot.commander import transitions
 from lapwing.services.autopilot.commander.command_handlers import Denied, call_or_deny, handles
 from lapwing.services.autopilot.commander.fence import Fence, rally_points
 from lapwing.services.autopilot.commander.flight_mode import fill_in, value, vector
+from lapwing.services.autopilot.commander.guidance import GRIPPER
 from lapwing.services.autopilot.commander.route import GRAB, Route
 from lapwing.services.autopilot.commander.transitions import Context
 
@@ -69,4 +70,7 @@ def region_of_interest(context: Context, command: Any) -> None:
 @handles("gripper")
 def gripper(context: Context, command: Any) -> None:
     """Open (0) or close (1) the gripper; a released payload does not return."""
-    context.state.guidance.released = value(command.values, 0) != GRAB
+    guidance = context.state.guidance
+    if not guidance.has_gripper:
+        raise ValueError(f"gripper: {GRIPPER} is 0; set it to 1 first")
+    guidance.released = value(command.values, 0) != GRAB

@@ -9,6 +9,8 @@ from lapwing.services.common import status_texts
 
 MAXIMUM_TILT = 0.35  # [rad] from the vertical
 MAXIMUM_OUTAGE = 0.5  # [s] of a source; single readings may be rejected
+_REQUIREMENTS = {"magnetometer": "SYS_HAS_MAG", "barometer": "SYS_HAS_BARO", "sonar": "SYS_HAS_NUM_DIST"}
+"""Parameter of each source that arming can do without, as in PX4: 0 skips the check."""
 _UNCERTAIN = {64: status_texts.POSITION_UNCERTAIN, 128: status_texts.ATTITUDE_UNCERTAIN}
 
 
@@ -24,7 +26,8 @@ def arming_blockers(view: CommanderInput, state: State) -> list[str]:
     if estimate.health == NOT_STARTED:
         return [status_texts.NOT_STARTED]
     bad = (name for name, time in zip(SOURCES, state.source_outage, strict=True) if time > MAXIMUM_OUTAGE)
-    blockers = [status_texts.NO_READINGS.format(name) for name in bad]
+    required = (name for name in bad if guidance.parameters.get(_REQUIREMENTS.get(name, ""), 1.0))  # as in former logs
+    blockers = [status_texts.NO_READINGS.format(name) for name in required]
     blockers += [text for bit, text in _UNCERTAIN.items() if estimate.health & bit]
     q = estimate.attitude
     if 1.0 - 2.0 * (q.x * q.x + q.y * q.y) < math.cos(MAXIMUM_TILT):

@@ -151,6 +151,8 @@ def gripper(session: Session, c: Command) -> Outcome:
     if not session.vehicle.description.gripper:
         session.send_text("DO_GRIPPER: the vehicle has no payload")
         return UNSUPPORTED
+    if session.parameters.value("PD_GRIPPER_EN") == 0.0:
+        return mavlink.MAV_RESULT_FAILED  # as in PX4
     return Request("gripper", (0.0,)) if c.params[1] == mavlink.GRIPPER_ACTION_RELEASE else UNSUPPORTED
 
 

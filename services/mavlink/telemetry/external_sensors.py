@@ -6,6 +6,7 @@ from typing import Any
 from lapwing.messages.topics import AIRSPEED, AIRSPEED_RECEIVED, OPTICAL_FLOW, RANGEFINDER, SONAR
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.mavlink.frames import Quaternion, from_euler, saturate
+from lapwing.services.mavlink.px4_facts import PRESSURE_OFFSET
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
@@ -43,7 +44,11 @@ def good_airspeed(v: VehicleCache) -> bool:
 
 def indicated_airspeed(v: VehicleCache) -> float | None:
     """Return the airspeed [m/s] along the tube at sea-level density. Return None without a reading."""
-    return math.sqrt(max(0.0, 2.0 * _airspeed(v).fluid_pressure / SEA_LEVEL_DENSITY)) if good_airspeed(v) else None
+    if not good_airspeed(v):
+        return None
+    offset = v.parameter(PRESSURE_OFFSET)
+    pressure = _airspeed(v).fluid_pressure - (0.0 if math.isnan(offset) else offset)  # NaN: not of this firmware
+    return math.sqrt(max(0.0, 2.0 * pressure / SEA_LEVEL_DENSITY))
 
 
 def orientation(azimuth_deg: float, elevation_deg: float) -> tuple[int, Quaternion]:

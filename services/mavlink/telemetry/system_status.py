@@ -1,11 +1,13 @@
 """Mode, health and clocks of the vehicle."""
 
+import math
 import time
 from collections.abc import Iterator
 from typing import Any
 
 from lapwing.messages.topics import ESTIMATE
 from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.mavlink.px4_facts import TYPE
 from lapwing.services.mavlink.telemetry.external_sensors import good_airspeed, good_distance, good_flow
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.telemetry.power import power
@@ -66,9 +68,9 @@ def heartbeat(v: VehicleCache) -> Any:
         state = mavlink.MAV_STATE_BOOT
     if s.failsafe:
         state = mavlink.MAV_STATE_CRITICAL
-    return mavlink.MAVLink_heartbeat_message(
-        vehicle_type(len(v.description.rotors)), v.firmware.AUTOPILOT, base, v.firmware.mode_number(s.mode), state, 3
-    )
+    set_type = v.parameter(TYPE)  # NaN: not a parameter of this firmware
+    kind = vehicle_type(len(v.description.rotors)) if math.isnan(set_type) else int(set_type)
+    return mavlink.MAVLink_heartbeat_message(kind, v.firmware.AUTOPILOT, base, v.firmware.mode_number(s.mode), state, 3)
 
 
 def healthy(v: VehicleCache) -> bool:

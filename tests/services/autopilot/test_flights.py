@@ -263,15 +263,17 @@ def test_estimate_is_valid_after_landing_and_second_flight():
         assert height(flight, 20.0) > 1.5
 
 
-def test_gripper_releases_payload():
+@pytest.mark.parametrize(("enabled", "released_mass"), [(1.0, 2.0), (0.0, 0.0)])
+def test_gripper_releases_payload_if_enabled(enabled, released_mass):
     items = [item("takeoff", z=3.0), item("waypoint", 1.0, 0.0, 3.0, hold=1.0), item("gripper", values=(0.0,)),
              item("waypoint", 2.0, 0.0, 3.0, hold=3.0)]  # fmt: skip
-    script = {0.04: [command("mission_upload", items=items), command("mission"), command("arm")]}
+    start = [command("mission_upload", items=items), command("mission"), command("arm")]
+    script = {0.04: [command("parameter", enabled, text="PD_GRIPPER_EN"), *start]}
     flight = fly(14, script, "effects.payload_release={}")
     thrust = flight.column("actuators", lambda m: sum(m.thrust))
     times, reached = flight.times("actuators"), flight.column("status", lambda m: m.mission_reached)
     released = flight.times("status")[reached == 2][0]
     before = thrust[(times > released - 0.5) & (times < released)].mean()
     after = thrust[times > 13.0].mean()
-    assert (before - after) / 9.80665 == pytest.approx(2.0, abs=0.1)  # kg
+    assert (before - after) / 9.80665 == pytest.approx(released_mass, abs=0.1)  # kg
     assert height(flight, 14.0) == pytest.approx(3.0, abs=0.1)

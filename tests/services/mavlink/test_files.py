@@ -157,9 +157,14 @@ def test_metadata_describes_every_listed_parameter():
 def test_metadata_marks_restart_and_read_only():
     content = files(describe(load("lapwing/scenes/groundstation.toml")))[PARAMETERS]
     described = {p["name"]: p for p in json.loads(content)["parameters"]}
-    assert [name for name, p in described.items() if p.get("rebootRequired")] == ["EKF2_HGT_REF"]
+    assert [name for name, p in described.items() if p.get("rebootRequired")] == [
+        "EKF2_HGT_REF",
+        "MAV_COMP_ID",
+        "MAV_SYS_ID",
+        "SYS_HAS_GPS",
+    ]
     assert described["SYS_AUTOSTART"]["readOnly"]
-    assert "readOnly" not in described["NAV_DLL_ACT"]
+    assert not [name for name in ("NAV_DLL_ACT", "GF_ACTION", "MAV_TYPE") if "readOnly" in described[name]]
 
 
 def test_scenes_metadata_is_json_without_nan():

@@ -50,9 +50,10 @@ def read(station, name):
 
 
 def facts(scene, *overrides):
+    """Return all parameters of a scene's vehicle."""
     description = describe(load(scene, overrides))
     values = {p.name: p.default for p in description.parameters}
-    return {fact.name: fact.value(values) for fact in px4_facts(description)}
+    return {fact.name: fact.value(values) for fact in px4_facts(description)} | values
 
 
 @pytest.mark.parametrize("page", REQUESTED)
@@ -98,6 +99,31 @@ def test_facts_are_listed_with_parameters_and_cannot_be_set():
     station.send("param_set", 1, 1, b"SYS_AUTOSTART", 0.0, mavlink.MAV_PARAM_TYPE_INT32)
     assert station.last("PARAM_ERROR").error == mavlink.MAV_PARAM_ERROR_READ_ONLY
     assert integer(station.last("PARAM_VALUE")) == 4001
+
+
+def test_present_value_of_fact_is_acknowledged():
+    bench = Bench()
+    station = bench.station()
+    set_whole(bench, station, "SYS_AUTOSTART", 4001)
+    assert integer(station.last("PARAM_VALUE")) == 4001
+    assert station.last("PARAM_ERROR") is None
+
+
+def test_negative_index_reads_by_name():
+    bench = Bench()
+    station = bench.station()
+    station.send("param_request_read", 1, 1, b"NAV_DLL_ACT", -2)
+    assert station.last("PARAM_VALUE").param_id == "NAV_DLL_ACT"
+
+
+def test_valid_value_is_not_out_of_range_when_too_many_wait():
+    bench = Bench()
+    station = bench.station()
+    for k in range(300):
+        station.send("param_set", 1, 1, b"MIS_TAKEOFF_ALT", 3.0 + 0.01 * k, mavlink.MAV_PARAM_TYPE_REAL32)
+    bench.step(3)
+    assert {m.error for m in station.all("PARAM_ERROR")} == {9}  # MAV_PARAM_ERROR_WRITE_FAIL
+    assert len(station.all("PARAM_ERROR")) == 300 - 256
 
 
 def test_parameter_change_is_broadcast_with_dependent_facts():
@@ -164,6 +190,98 @@ def test_changed_counterpart_is_shown_in_px4_parameter():
     set_whole(bench, station, "GF_ACTION", 0)
     set_whole(bench, station, "FS_FENCE_ACT", 2)
     assert integer(read(station, "GF_ACTION")) == 3
+
+
+def present_address(station):
+    return {(m.get_srcSystem(), m.get_srcComponent()) for m in station.got}
+
+
+def test_address_changes_at_reboot():
+    bench = Bench()
+    station, other = bench.station(), bench.station(system=254)
+    set_whole(bench, station, "MAV_SYS_ID", 42)
+    set_whole(bench, station, "MAV_COMP_ID", 7)
+    bench.step(60)
+    assert integer(read(station, "MAV_SYS_ID")) == 42
+    assert present_address(station) == {(1, 1)}
+    assert station.command(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1.0) == mavlink.MAV_RESULT_ACCEPTED
+    bench.step(2)
+    for each in (station, other):
+        each.got.clear()
+    bench.step(120)
+    for each in (station, other):
+        assert present_address(each) == {(42, 7)}
+        assert each.last("HEARTBEAT")
+    assert bench.station().endpoint.send(mavlink.MAVLink_ping_message(0, 0, 0, 0)) is None
+    assert present_address(bench.stations[-1]) == {(42, 7)}  # also of a later connection
+    station.got.clear()
+    station.send("param_request_read", 1, 1, b"MAV_SYS_ID", -1)
+    assert station.got == []
+    station.send("param_request_read", 42, 7, b"MAV_SYS_ID", -1)
+    assert integer(station.last("PARAM_VALUE")) == 42
+
+
+@pytest.mark.parametrize(
+    ("action", "armed", "result"),
+    [
+        (0.0, True, mavlink.MAV_RESULT_ACCEPTED),  # nothing to do
+        (1.0, True, mavlink.MAV_RESULT_DENIED),
+        (2.0, False, mavlink.MAV_RESULT_DENIED),  # shutdown
+        (math.nan, False, mavlink.MAV_RESULT_DENIED),
+    ],
+)
+def test_reboot_only_while_disarmed(action, armed, result):
+    bench = Bench()
+    station = bench.station()
+    bench.vehicle.armed = armed
+    set_whole(bench, station, "MAV_SYS_ID", 42)
+    bench.step(2)
+    assert station.command(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, action) == result
+    station.got.clear()
+    bench.step(120)
+    assert present_address(station) == {(1, 1)}
+
+
+@pytest.mark.parametrize("value", [0, 251, -1, 2**31 - 1])
+@pytest.mark.parametrize("name", ["MAV_SYS_ID", "MAV_COMP_ID"])
+def test_address_out_of_range_is_rejected(name, value):
+    bench = Bench()
+    station = bench.station()
+    set_whole(bench, station, name, value)
+    assert station.last("PARAM_ERROR").error == mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
+    assert integer(station.last("PARAM_VALUE")) == 1
+
+
+def test_vehicle_type_is_shown_in_heartbeat():
+    bench = Bench()
+    station = bench.station()
+    set_whole(bench, station, "MAV_TYPE", mavlink.MAV_TYPE_OCTOROTOR)
+    bench.step(60)
+    assert station.last("HEARTBEAT").type == mavlink.MAV_TYPE_OCTOROTOR
+    set_whole(bench, station, "MAV_TYPE", mavlink.MAV_TYPE_FIXED_WING)
+    assert station.last("PARAM_ERROR").error == mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
+
+
+@pytest.mark.parametrize(
+    "message",
+    [
+        ("param_request_list", ()),
+        ("param_request_read", (b"MAV_SYS_ID", -1)),
+        ("param_set", (b"MIS_TAKEOFF_ALT", 9.0, mavlink.MAV_PARAM_TYPE_REAL32)),
+    ],
+)
+def test_parameter_message_to_all_systems_is_ignored(message):
+    kind, fields = message
+    bench = Bench()
+    station = bench.station()
+    station.send(kind, 0, 0, *fields)
+    bench.step(5)
+    assert not station.all("PARAM_VALUE")
+    assert bench.vehicle.parameters["MIS_TAKEOFF_ALT"] == 2.5
+    assert bench.counts["parameter message for all systems"] == 1
+    station.send(kind, 1, 0, *fields)  # all components of the system
+    bench.step(5)
+    assert station.all("PARAM_VALUE")
 
 
 def test_parameters_of_client_tests_exist():

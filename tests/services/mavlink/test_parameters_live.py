@@ -73,10 +73,12 @@ class Station:
 
 
 @pytest.fixture
-def station(tmp_path):
+def station(tmp_path, request):
+    """Return the ground station of a run; an indirect parameter has further arguments of the command."""
     port = free_port()
     command = [sys.executable, "-m", "lapwing", "run", "groundstation", "--mavlink", f"udpout:127.0.0.1:{port}"]
     command += ["--speed", "5", "--key-prefix", "test-px4-parameters", "--log", str(tmp_path / "flight.mcap")]
+    command += getattr(request, "param", [])
     with subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL) as process:
         result = Station(port, process)
         yield result
@@ -95,6 +97,62 @@ def test_satellites_of_simulated_gps_decide_fix_and_arming(station):
     assert station.set("SIM_GPS_USED", 10) == 10
     assert station.receive("GPS_RAW_INT", lambda m: m.fix_type >= 3).satellites_visible == 10
     station.receive("SYS_STATUS", lambda m: m.onboard_control_sensors_health & gps)
+
+
+def test_address_and_type_of_vehicle_are_set(station):
+    armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    assert station.set("MAV_TYPE", mavlink.MAV_TYPE_HEXAROTOR) == mavlink.MAV_TYPE_HEXAROTOR
+    station.receive("HEARTBEAT", lambda m: m.type == mavlink.MAV_TYPE_HEXAROTOR)
+    for name, value in (("MAV_TYPE", mavlink.MAV_TYPE_FIXED_WING), ("MAV_SYS_ID", 251)):
+        assert station.error(name, as_float(value), INTEGER) == OUT_OF_RANGE
+        station.receive("PARAM_VALUE", lambda m, name=name: m.param_id == name)
+    assert station.set("MAV_SYS_ID", 42) == 42
+    station.receive("HEARTBEAT", lambda m: m.get_srcSystem() == 1)
+    reboot = mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
+    station.take_off()
+    assert station.command(reboot, 1.0) == mavlink.MAV_RESULT_DENIED
+    assert station.command(mavlink.MAV_CMD_NAV_LAND) == mavlink.MAV_RESULT_ACCEPTED
+    station.receive("HEARTBEAT", lambda m: not m.base_mode & armed and m.get_srcSystem() == 1)
+    assert station.command(reboot, 1.0) == mavlink.MAV_RESULT_ACCEPTED
+    station.receive("HEARTBEAT", lambda m: m.get_srcSystem() == 42)
+    station.receive("GLOBAL_POSITION_INT", lambda m: m.get_srcSystem() == 42)
+    station.link.mav.param_set_send(42, 1, b"MIS_TAKEOFF_ALT", 4.0, REAL)
+    message = station.receive("PARAM_VALUE", lambda m: m.param_id == "MIS_TAKEOFF_ALT")
+    assert (message.get_srcSystem(), message.param_value) == (42, 4.0)
+
+
+def test_arming_without_sensor_that_vehicle_need_not_have(station):
+    arm = mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0
+    ready = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    station.receive("SYS_STATUS", lambda m: m.onboard_control_sensors_health & ready)
+    off = mavlink.FAILURE_UNIT_SENSOR_BARO, mavlink.FAILURE_TYPE_OFF
+    assert station.command(mavlink.MAV_CMD_INJECT_FAILURE, *off) == mavlink.MAV_RESULT_ACCEPTED
+    station.receive("SYS_STATUS", lambda m: not m.onboard_control_sensors_health & ready)
+    assert station.command(*arm) != mavlink.MAV_RESULT_ACCEPTED
+    assert station.set("SYS_HAS_BARO", 0) == 0
+    station.receive("SYS_STATUS", lambda m: m.onboard_control_sensors_health & ready)
+    assert station.command(*arm) == mavlink.MAV_RESULT_ACCEPTED
+
+
+@pytest.mark.parametrize("station", [["--set", "autopilot.parameters.SYS_HAS_GPS=0"]], indirect=True)
+def test_autopilot_that_has_no_gps(station):
+    gps = mavlink.MAV_SYS_STATUS_SENSOR_GPS
+    station.receive("SYS_STATUS", lambda m: not m.onboard_control_sensors_health & gps)
+    assert station.set("SYS_HAS_GPS", 1) == 1  # at the next start
+    start = station.receive("GLOBAL_POSITION_INT").time_boot_ms
+    station.receive("GLOBAL_POSITION_INT", lambda m: m.time_boot_ms > start + 5000)
+    assert not station.receive("SYS_STATUS").onboard_control_sensors_health & gps
+    assert station.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0) != mavlink.MAV_RESULT_ACCEPTED
+
+
+@pytest.mark.parametrize("station", [["--set", "effects.payload_release={}"]], indirect=True)
+def test_disabled_gripper_fails(station):
+    release = mavlink.MAV_CMD_DO_GRIPPER, 1.0, mavlink.GRIPPER_ACTION_RELEASE
+    assert station.set("PD_GRIPPER_EN", 0) == 0
+    assert station.command(*release) == mavlink.MAV_RESULT_FAILED
+    station.link.mav.param_set_send(1, 1, b"PD_GRIPPER_EN", as_float(1), INTEGER)
+    station.receive("PARAM_VALUE", lambda m: m.param_id == "PD_GRIPPER_EN" and m.param_value == as_float(1))
+    assert station.command(*release) == mavlink.MAV_RESULT_ACCEPTED
 
 
 def test_detection_of_motor_failures_is_switched_in_flight(station):

@@ -9,15 +9,21 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 from fake_vehicle import FakeVehicle, free_port, until
 from pymavlink import mavutil
 
+from lapwing.cosim.diagram.block_diagram import to_record_batches
 from lapwing.cosim.log import LogReader, LogWriter
+from lapwing.cosim.transport.packets import pack_log_packet
+from lapwing.messages import Status, header
+from lapwing.messages.topics import STATUS
 from lapwing.runs.single_process_run import fly_single
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.links import check
+from lapwing.services.mavlink.service import _handle_log_packet
 from lapwing.services.scene_resolver import load, resolve
 from tests.endpoints import loopback_endpoints
 from tests.participants import participants
@@ -183,3 +189,15 @@ def test_mission_of_plan_can_be_downloaded(tmp_path):
     assert result[4].z == pytest.approx(
         10.0, abs=0.02
     )  # above home; the body origin at rest is 0.35 m above the ground
+
+
+def test_statuses_of_different_lengths_are_handled_in_order():
+    modes = ("hold", "land", "position_control", "land", "hold")  # their messages have two lengths
+    messages = [(STATUS, tick, Status(header(tick, "world"), mode, mode).encode()) for tick, mode in enumerate(modes)]
+    pages = to_record_batches(messages)
+    assert len(pages) == 2
+    handled = []
+    server = SimpleNamespace(handle=lambda *message: handled.append(message))
+    _handle_log_packet({"drone1": server}, pack_log_packet(pages, 0, 5), True, 1)
+    assert [time_ns for _, time_ns, _ in handled] == [0, 1, 2, 3, 4]
+    assert tuple(STATUS.message.decode(payload).mode for *_, payload in handled) == modes

@@ -113,6 +113,16 @@ def test_airspeed_is_ground_speed_without_sensor():
     assert none.airspeed == none.groundspeed
 
 
+def test_offset_of_airspeed_sensor_is_subtracted():
+    bench = Bench("sensors.airspeed={}")
+    station = bench.station()
+    bench.vehicle.more = [(AIRSPEED, FluidPressure(HEAD, 0.5 * 1.225 * 8.0**2 + 10.0, 0.0))]
+    station.send("param_set", 1, 1, b"SENS_DPRES_OFF", 10.0, mavlink.MAV_PARAM_TYPE_REAL32)
+    bench.step(100)
+    assert station.last("PARAM_VALUE").param_value == 10.0
+    assert station.last("VFR_HUD").airspeed == pytest.approx(8.0)
+
+
 def test_airspeed_is_value_received_by_autopilot():
     read = (AIRSPEED, FluidPressure(HEAD, 0.5 * 1.225 * 8.0**2, 0.0))
     half = shown(read, (AIRSPEED_RECEIVED, FluidPressure(HEAD, 0.5 * 1.225 * 4.0**2, 0.0))).last("VFR_HUD")

@@ -191,7 +191,7 @@ def _act(constants: Constants, view: CommanderInput, guidance: Guidance, item: A
         guidance.speed = item.values[0]
     elif item.action == "roi":
         guidance.roi = (place[0], place[1], place[2]) if all(map(math.isfinite, place[:2])) else None
-    elif item.action == "gripper":
+    elif item.action == "gripper" and guidance.has_gripper:
         guidance.released = item.values[:1] != (GRAB,)
     elif item.action == "set_home":
         x, y, z = view.estimate.position_world

@@ -7,9 +7,16 @@ from lapwing.services.autopilot.estimator import SOURCES
 from lapwing.services.autopilot.initial_estimate import EXACT, NOT_STARTED
 
 
+def with_sonar(constants=CONSTANTS):
+    """Return a session of a vehicle with every source; the scene's true state replaces all but the sonar."""
+    session = Session(constants._replace(has_trajectory=False))
+    session.commander.state.guidance.parameters["SYS_HAS_NUM_DIST"] = 1.0
+    return session
+
+
 def blockers_after(bits, seconds, constants=CONSTANTS):
     """Return the arming blockers after a time with these health bits."""
-    session = Session(constants._replace(has_trajectory=False))
+    session = with_sonar(constants)
     session.step(estimate=EXACT, estimate_interval=0.02)
     for _ in range(round(seconds / 0.02)):
         request = session.step(estimate=EXACT._replace(health=bits), estimate_interval=0.02)
@@ -40,3 +47,21 @@ def test_commander_without_operator_has_no_arming_checks():
     blockers, outage = blockers_after(1, 1.0, CONSTANTS._replace(has_operator=False))
     assert blockers == []
     assert outage == [0.0] * len(SOURCES)
+
+
+@pytest.mark.parametrize(
+    ("source", "parameter"),
+    [("magnetometer", "SYS_HAS_MAG"), ("barometer", "SYS_HAS_BARO"), ("sonar", "SYS_HAS_NUM_DIST")],
+)
+def test_sensor_that_arming_does_not_require(source, parameter):
+    session = with_sonar()
+    bits = 1 << SOURCES.index(source)
+    for required, blockers in ((1.0, (f"no good readings of the {source}",)), (0.0, ())):
+        session.commander.state.guidance.parameters[parameter] = required
+        for _ in range(50):
+            request = session.step(estimate=EXACT._replace(health=bits), estimate_interval=0.02)
+        assert request.status.arming_blockers == blockers
+    for other in set(SOURCES) - {source}:
+        for _ in range(50):
+            request = session.step(estimate=EXACT._replace(health=1 << SOURCES.index(other)), estimate_interval=0.02)
+        assert request.status.arming_blockers == (f"no good readings of the {other}",)
