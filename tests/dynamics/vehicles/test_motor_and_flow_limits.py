@@ -77,7 +77,7 @@ class Flow:
 
     def rate(self, p, volts, memory, side, y):
         e, rotor, speed = p.effects[1], p.effects[2], y[18:]
-        low, high = self.gaps(p, volts, memory, y, None)
+        high = self.gaps(p, volts, memory, y, None)[1]
         blades = e.pitch * speed
         flow = np.where(side[0] < 0.0, -0.5 * blades, np.where(side[1] > 0.0, 1.5 * blades, high + 1.5 * blades))
         lift = e.slope * (blades - flow)
