@@ -87,6 +87,27 @@ def test_rotors_at_limit_of_axial_inflow_have_bits_of_one_alone():
         assert np.array_equal(rows(end)[k], pack_row(one.motion))
 
 
+@pytest.mark.long
+@pytest.mark.parametrize("effect", ["dc_motor={}", "dc_motor={inductance=5e-5}", "dynamic_inflow={}"])
+def test_limits_of_motors_and_flow_have_bits_of_one_alone(effect):
+    """Rotors of two members of three reach a limit, whose steps are under error control."""
+    overrides, ticks, volts = [f"effects.{effect}"], 25, (28.0, 31.0, 30.0, 33.0)
+    batch = lapwing.BatchSimulator("hover", 3, overrides=overrides)
+    speeds, climb = [310.0, 335.0, 150.0], [0.0, 6.0, -6.0]
+    start = {"position_world": (0.0, 0.0, 50.0), "rotor_speed": np.repeat(speeds, 4).reshape(3, 4)}
+    batch.reset(**start, velocity_world=[(0.0, 0.0, v) for v in climb])
+    end = batch.step(motor_voltages=np.tile(volts, (3, 1)), ticks=ticks)
+    plant = resolve(load("hover", overrides)).services["plant"].parameters
+    core, state = plant.core, plant.start.vehicle
+    for k, v in enumerate(climb):
+        motion = state.motion._replace(
+            position_world=(0.0, 0.0, 50.0), velocity_world=(0.0, 0.0, v), rotor_speed=(speeds[k],) * 4
+        )
+        one = state._replace(motion=motion)
+        one = flown(core.method, core.vehicle, core.key, one, volts, core.step, core.steps, ticks)
+        assert np.array_equal(rows(end)[k], pack_row(one.motion))
+
+
 def test_members_are_reset_alone(batch):
     first = batch.reset()
     volts = np.full((N, 4), 33.0)

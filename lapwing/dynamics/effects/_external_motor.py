@@ -78,6 +78,13 @@ def _power_of(e, both, former):
     return electrical * e.inverse_esc_efficiency if current >= 0.0 else electrical / e.inverse_esc_efficiency
 
 
+@hooks.switches(ExternalDcMotor)
+def reaches_limit(e, memory, s, voltage, h):
+    """Return True unless every current of the effect stays within its limits, or beyond one of them."""
+    (own, _), _ = memory
+    return hooks.all_switches((e.own,), (own,), s, voltage, h)
+
+
 @hooks.motor(ExternalDcMotor)
 def external_motor(e, memory, s, loads, voltage):
     """Return (acceleration [rad/s^2], current [A], power [W]) of each rotor."""

@@ -28,8 +28,8 @@ Hooks between evaluations:
     substeps             (e, memory, motion, h) -> int               least number of substeps of a stiff effect
     wrench_and_rate      (e, memory, motion) -> (force_world, torque_body, rate of its memory)    of a stiff effect
                          whose memory is integrated with the motion; the force is that of its wrench
-    switches             (e, memory, s, h) -> bool                   True if the loads can jump or have a kink in the
-                         next h [s], at a moment that depends on the motion
+    switches             (e, memory, s, voltage, h) -> bool          True if loads or motors can jump or have a kink in
+                         the next h [s], at a moment that depends on the motion; voltage as of `motor`
     timed_update         (e, memory, t) -> memory                    of an effect that changes at a given moment
     break_time           (e, memory, t, h, value) -> the lesser of value and the first time after t [s] at which the
                          loads jump or have a kink: steps, of at most h [s], end and timed updates are made there
@@ -237,11 +237,11 @@ all_contact_forces = _generate_calls(
 all_switches = _generate_calls(
     "all_switches",
     "switches",
-    "s, h",
-    "switching = f{i}(effects[{i}], memory[{i}], s, h)",
+    "s, voltage, h",
+    "switching = f{i}(effects[{i}], memory[{i}], s, voltage, h)",
     "switching",
     default="False",
-    more="switching = switching or f{i}(effects[{i}], memory[{i}], s, h)",
+    more="switching = switching or f{i}(effects[{i}], memory[{i}], s, voltage, h)",
 )
 all_sleeping = _generate_calls(
     "all_sleeping",

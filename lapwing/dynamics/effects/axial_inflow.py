@@ -83,14 +83,19 @@ def axial_inflow(e, memory, s, factors, before):
 
 
 @always_inline
+def fastest_spin(layout, speed):
+    """Return the largest acceleration of a rotor by its lag [rad/s^2]."""
+    return layout.lag_rate * max(speed, layout.speed_per_volt * layout.max_voltage - speed)
+
+
+@always_inline
 def _reaches(c, reached, axial, speed):
     turn_per_metre, layout, h = c
     off = abs(turn_per_metre * abs(axial) - LIMIT * speed)
-    spin = layout.lag_rate * max(speed, layout.speed_per_volt * layout.max_voltage - speed)
-    return reached or off <= h * (turn_per_metre * SUDDEN + LIMIT * spin)
+    return reached or off <= h * (turn_per_metre * SUDDEN + LIMIT * fastest_spin(layout, speed))
 
 
 @switches(AxialInflow)
-def reaches_limit(e, memory, s, h):
+def reaches_limit(e, memory, s, voltage, h):
     """Return True unless the axial speed of every hub stays within its limit, or beyond it."""
     return reduce_tuple(_reaches, (e.turn_per_metre, s.layout, h), False, axial_speeds(s), s.motion.rotor_speed)

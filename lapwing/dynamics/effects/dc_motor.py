@@ -7,13 +7,13 @@ from annotated_types import Ge, Le
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._axes import by_axis
-from lapwing.dynamics.effects._external_motor import DcMotorInputs, ExternalDcMotor, idle_current
+from lapwing.dynamics.effects._external_motor import FULL_FRICTION, DcMotorInputs, ExternalDcMotor, idle_current
 from lapwing.dynamics.effects._from_scene import validate_table
-from lapwing.dynamics.effects._hooks import discrete_update, motor
+from lapwing.dynamics.effects._hooks import discrete_update, motor, switches
 from lapwing.dynamics.vector import first, pair, second
 from lapwing.kernels import always_inline
 from lapwing.kernels import math as exact
-from lapwing.kernels.codegen import map_tuple
+from lapwing.kernels.codegen import map_tuple, reduce_tuple
 
 if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -223,3 +223,63 @@ def dc_motor(e, memory, s, loads, voltage):
         map_tuple(second, 0.0, driven, driven),
         map_tuple(_third, 0.0, driven, driven),
     )
+
+
+@always_inline
+def _near_limit(e, most, h, speed, free, slack):
+    """Return True if a current before limits [A], known to `slack`, can reach a limit within h [s]; see `switches`."""
+    # no rotor is braked by more than the largest torque of its motor
+    spin = h * e.efficiency * e.motor_constant * e.inverse_inertia * (most - e.least_current)  # [rad/s]
+    reach = slack + e.motor_constant * e.inverse_resistance * spin
+    lacking = e.least_current - free  # at constant voltage a current that is above this limit does not reach it
+    above = free - _limit_current(e, speed, math.inf)
+    corner = e.power_limit / e.current_limit - e.current_limit / e.inverse_resistance - e.motor_constant * speed
+    return (
+        -slack <= lacking <= reach
+        or abs(above) <= 1.5 * reach  # the limit of the power moves by up to half
+        or abs(corner) <= e.motor_constant * spin
+        or abs(speed - FULL_FRICTION) <= spin
+    )
+
+
+@always_inline
+def _most_current(e, layout):
+    return min(e.current_limit, layout.max_voltage * e.inverse_resistance)
+
+
+@always_inline
+def _reaches_without_lag(c, reached, speed, voltage):
+    e, layout, h = c
+    return reached or _near_limit(e, _most_current(e, layout), h, speed, _free(e, speed, voltage), 0.0)
+
+
+@always_inline
+def _reaches_with_lag(c, reached, both, winding):
+    e, layout, h = c
+    speed, voltage = both
+    lag, inverse_inertia, _ = e.winding
+    most, free = _most_current(e, layout), _free(e, speed, voltage)
+    change = lag * e.efficiency * e.motor_constant * inverse_inertia * (abs(free) + most)  # by the acceleration
+    return reached or _near_limit(e, most, h, speed, free, change + abs(winding[0]))
+
+
+@always_inline
+def _any_without_lag(arguments):
+    c, _, speed, voltage = arguments
+    return reduce_tuple(_reaches_without_lag, c, False, speed, voltage)
+
+
+@always_inline
+def _any_with_lag(arguments):
+    c, memory, speed, voltage = arguments
+    return reduce_tuple(_reaches_with_lag, c, False, map_tuple(pair, 0.0, speed, voltage), memory[1])
+
+
+@switches(DcMotor)
+def reaches_limit(e, memory, s, voltage, h):
+    """Return True unless every current stays within its limits, or beyond one of them.
+
+    At constant voltage V a current before limits, (V - K w) / R, changes with the speed only.
+    """
+    arguments = (e, s.layout, h), memory, s.motion.rotor_speed, voltage
+    return by_axis(_any_without_lag, _any_with_lag, e.winding, arguments)

@@ -4,14 +4,14 @@ from typing import TYPE_CHECKING, NamedTuple
 
 from lapwing.dynamics.effects._axes import hub_speeds
 from lapwing.dynamics.effects._from_scene import reject, validate_table
-from lapwing.dynamics.effects._hooks import discrete_update, loads
+from lapwing.dynamics.effects._hooks import discrete_update, loads, switches
 from lapwing.dynamics.effects._rotor_sums import with_changes
-from lapwing.dynamics.effects.axial_inflow import KIND
+from lapwing.dynamics.effects.axial_inflow import KIND, SUDDEN, fastest_spin
 from lapwing.dynamics.vector import pair
 from lapwing.dynamics.vehicles import inflow
 from lapwing.dynamics.vehicles.propeller import thrust_coefficient
 from lapwing.kernels import always_inline, kernel, math
-from lapwing.kernels.codegen import map_tuple
+from lapwing.kernels.codegen import map_tuple, reduce_tuple
 
 if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
@@ -20,6 +20,7 @@ __all__ = ["KIND", "DynamicInflow", "Settings"]
 
 APPARENT_MASS = 0.637  # of the sphere of air around the disc
 SLOWEST = 1e-3  # [m/s] lower limit of the induced velocity in ratios
+SLOWEST_FLOW, FASTEST_FLOW = -0.5, 1.5  # limits of the flow through the disc over the pitch speed
 LARGEST_SHARE = 0.9  # limit of the induced velocity in hover over the pitch speed
 
 
@@ -74,7 +75,7 @@ class DynamicInflow(NamedTuple):
 def _through(e, axial, speed, induced):
     """Return the air speed through the disc [m/s], clamped to the range without stall and strong braking."""
     blades = e.pitch * speed
-    return min(max(axial + induced, -0.5 * blades), 1.5 * blades)
+    return min(max(axial + induced, SLOWEST_FLOW * blades), FASTEST_FLOW * blades)
 
 
 @kernel
@@ -111,3 +112,19 @@ def dynamic_inflow(e, memory, s, factors, before):
     """Add the loads of each rotor to `before`."""
     change = map_tuple(_change, e, map_tuple(pair, 0.0, s.motion.rotor_speed, memory), hub_speeds(s))
     return with_changes(s, factors, before, change)
+
+
+@always_inline
+def _reaches(c, reached, both, hub):
+    pitch, layout, h = c
+    speed, induced = both
+    flow, blades = hub[0] + induced, pitch * speed
+    off = min(abs(flow - SLOWEST_FLOW * blades), abs(flow - FASTEST_FLOW * blades))
+    return reached or off <= h * (SUDDEN + FASTEST_FLOW * pitch * fastest_spin(layout, speed))
+
+
+@switches(DynamicInflow)
+def reaches_limit(e, memory, s, voltage, h):
+    """Return True unless the flow through every disc stays within its limits, or beyond them."""
+    both = map_tuple(pair, 0.0, s.motion.rotor_speed, memory)
+    return reduce_tuple(_reaches, (e.pitch, s.layout, h), False, both, hub_speeds(s))

@@ -89,6 +89,6 @@ def shared_slung_load(e, memory, s, rotors):
 
 
 @switches(SharedSlungLoad)
-def comes_taut_or_slack(e, memory, s, h):
+def comes_taut_or_slack(e, memory, s, voltage, h):
     """Return True unless the cable stays taut, or the load is unknown."""
     return memory[3] >= 0.0 and cable_slackens(e.sling, s.R_world_body, _with_load(memory, s.motion, s.t), h)

@@ -55,7 +55,9 @@ def _form_switches(layout, x, h):
 def switches(drive, t, x, h):
     """Return True if the loads can have a state-dependent jump or kink within h [s] after t [s]."""
     p, seen = drive.parameters, motion_of(drive.parameters.layout, x)
-    return _form_switches(p.layout, x, h) or hooks.all_switches(p.effects, drive.memory, inputs(drive, t, seen), h)
+    voltage = hooks.all_supply_voltage(p.effects, drive.memory, drive.voltage)
+    s = inputs(drive, t, seen)
+    return _form_switches(p.layout, x, h) or hooks.all_switches(p.effects, drive.memory, s, voltage, h)
 
 
 @always_inline
