@@ -274,5 +274,5 @@ class BatchSimulator:
         self.run_blocks(work)
 
     def _mark_invalid(self, first: int, last: int) -> None:
-        layout = (self._flat, self._blocks.shape[1], self._motion, self._core.step)
+        layout = (self._like, self._flat, self._blocks.shape[1], self._core.step)
         simd_batch.mark_invalid(*layout, self._valid, first, last)

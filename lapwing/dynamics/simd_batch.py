@@ -30,6 +30,7 @@ from lapwing.dynamics.vehicles.multirotor_equations import (
 from lapwing.kernels import always_inline, kernel, math, vectorise_loops
 from lapwing.kernels.codegen import compile_source, generic, map_index
 from lapwing.kernels.row_packing import construction, leaves, pack_row, row_width
+from lapwing.kernels.state_tree import finite
 
 WIDTH = 16  # number of members of a block
 LARGEST_TURN = 0.25  # [rad] rotation in a step beyond which no method is accurate
@@ -91,11 +92,8 @@ def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, l
                     rate_control.command(rates, memory, base + lane, WIDTH, setpoints, commands, m)
                 _begin(like, memory, base + lane, (keys[m, 0], keys[m, 1]), ticks[m], commands, m, n * h)
                 ticks[m] += 1
-            split, alike = _parts(like, memory, base, h), True
-            for lane in range(WIDTH):
-                alike = alike and _parts(like, memory, base + lane, h) == split
-                alike = alike and not _breaks(like, memory, base + lane, n * h, h / split)
-            part, i = h / split, 0
+            split = _parts(like, memory, base, h)
+            alike, part, i = _alike(like, memory, base, n * h, h, split), h / split, 0
             while alike and i < n * split and _all_asleep(like, memory, base, i, part):
                 for lane in range(WIDTH):
                     _airborne_step(method, like, memory, base + lane, i, part)
@@ -105,27 +103,24 @@ def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, l
                 _finish(method, like, memory, base + lane, n * h, h / split, i, n * split)
 
 
-@kernel
-def mark_invalid(memory, columns, motion, step, valid, first, last):
+@vectorise_loops
+def mark_invalid(like, memory, columns, step, valid, first, last):
     """Clear `valid` of members of the blocks [first, last) that are not finite, or turn too fast for a step.
 
     Args:
+        like: a Member.
         memory: memory of `blocks`, flat.
         columns: number of columns of a block.
-        motion: columns of the motion.
         step: step of the integrator [s].
         valid: shape (members,) of bool, changed.
         first: first block.
         last: last block (exclusive).
     """
-    for m in range(first * WIDTH, last * WIDTH):
-        at = (m // WIDTH) * columns * WIDTH + m % WIDTH
-        finite = True
-        for k in range(motion):
-            finite = finite and math.isfinite(memory[at + k * WIDTH])
-        turn = rate_control.omega_body(memory, at, WIDTH)
-        if not (finite and vector.norm(turn) * step <= LARGEST_TURN):
-            valid[m] = False
+    for block in range(first, last):
+        for lane in range(WIDTH):
+            motion = take(like, memory, block * columns * WIDTH + lane).motion
+            sound = finite(motion) & (vector.norm(motion.omega_body) * step <= LARGEST_TURN)
+            valid[block * WIDTH + lane] &= sound
 
 
 @kernel
@@ -159,11 +154,19 @@ def _parts(like, memory, at, h):
 
 
 @always_inline
-def _breaks(like, memory, at, interval, h):
-    """Return True if a member has a breakpoint in its communication step."""
-    m = take(like, memory, at)
-    end = m.start + interval
-    return multirotor_stepper.next_break(m.parameters, m.memory, m.start, interval, end, h) < math.inf
+def _alike(like, memory, base, interval, h, split):
+    """Return True if all members of a block have `split` substeps, no breakpoint, and memories that allow sleep.
+
+    This is constant over a communication step as long as no effect wakes up, so it is not evaluated at each step.
+    """
+    others = 0  # a sum, since a loop that ends early is not vectorised
+    for lane in range(WIDTH):
+        m = take(like, memory, base + lane)
+        p, end = m.parameters, m.start + interval
+        breaks = multirotor_stepper.next_break(p, m.memory, m.start, interval, end, h / split) < math.inf
+        if breaks or multirotor_stepper.parts(p.layout, h) != split or not hooks.all_can_sleep(p.effects, m.memory):
+            others += 1
+    return others == 0
 
 
 @always_inline
