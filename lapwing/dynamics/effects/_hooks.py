@@ -24,7 +24,7 @@ Hooks between evaluations:
     mass_properties      (e, memory, body) -> MassProperties         for the next communication step
     discrete_update      (e, memory, s, rotors, key, tick, interval) -> memory    once per communication step, before
                          its first integrator step; s and rotors exclude effects that can sleep
-    is_sleeping          (e, memory, motion, h) -> bool              True if the effect cannot act in the next step
+    is_sleeping          (e, motion, h) -> bool                      True if the effect cannot act in the next step
     can_sleep            (e, memory) -> bool                         False while its memory keeps the effect awake even
                          if `is_sleeping`; constant while steps are taken without the effect
     substeps             (e, memory, motion, h) -> int               least number of substeps of a stiff effect
@@ -250,10 +250,10 @@ all_sleeping = _generate_calls(
     "all_sleeping",
     "is_sleeping",
     "motion, h",
-    "sleeping = f{i}(effects[{i}], memory[{i}], motion, h)",
+    "sleeping = f{i}(effects[{i}], motion, h)",
     "sleeping",
     default="True",
-    more="sleeping = sleeping and f{i}(effects[{i}], memory[{i}], motion, h)",
+    more="sleeping = sleeping and f{i}(effects[{i}], motion, h)",
 )
 all_can_sleep = _generate_calls(
     "all_can_sleep",
@@ -275,11 +275,11 @@ def all_stiff_sleeping(effects: Any, memory: Any, motion: Any, h: Any) -> Callab
     ]
     names: dict[str, Any] = {}
     calls = []
-    for hook, more in (("is_sleeping", ", motion, h"), ("can_sleep", "")):
+    for hook, arguments in (("is_sleeping", "motion, h"), ("can_sleep", "memory[{i}]")):
         for i, parameters in stiff:
             if parameters in HOOKS[hook]:
                 names[f"{hook}{i}"] = HOOKS[hook][parameters]
-                calls.append(f"{hook}{i}(effects[{i}], memory[{i}]{more})")
+                calls.append(f"{hook}{i}(effects[{i}], {arguments.format(i=i)})")
     return compile_source(
         "all_stiff_sleeping(effects, memory, motion, h)", names, f"return {' and '.join(calls) or 'True'}"
     )

@@ -32,7 +32,7 @@ RELAXED = 1e-13  # [m] deflection of friction elements that counts as zero
 
 
 @is_sleeping(GroundContact, GroundContactSmooth)
-def far(e, memory, motion, h):
+def far(e, motion, h):
     """Return True if no foot can reach the ground within a step."""
     velocity = motion.velocity_world
     approach = max(-over_plane(e.terrain, velocity), 0.0)
