@@ -87,7 +87,7 @@ def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, l
         base = block * columns * WIDTH
         for _ in range(count):
             for lane in range(WIDTH):
-                m = block * WIDTH + lane
+                m = np.uintp(block * WIDTH + lane)  # unsigned, so that indexing has no check for negative values
                 if rates is not None:
                     rate_control.command(rates, memory, base + lane, WIDTH, setpoints, commands, m)
                 _begin(like, memory, base + lane, (keys[m, 0], keys[m, 1]), ticks[m], commands, m, n * h)
