@@ -5,7 +5,7 @@ from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
 from os import cpu_count
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -228,12 +228,11 @@ class BatchSimulator:
     def advance_under_rates(self, first: int, last: int, ticks: int) -> None:
         """Advance the blocks [first, last) under the rows of `setpoints`."""
         simd_batch.advance(*self._advance_arguments, first, last, ticks, self._controller, self.setpoints)
-        self._mark_invalid(first, last)
 
     @cached_property
-    def _advance_arguments(self) -> tuple[Any, Any, np.ndarray, int, np.ndarray, np.ndarray, np.ndarray, float, int]:
+    def _advance_arguments(self) -> tuple:
         """First arguments of `simd_batch.advance`."""
-        memory = (self._like, self._flat, self._blocks.shape[1], self._keys, self._ticks, self._commands)
+        memory = (self._like, self._flat, self._blocks.shape[1], self._keys, self._ticks, self._commands, self._valid)
         return (self._core.method, *memory, self._core.step, self._core.steps)
 
     @cached_property
@@ -266,13 +265,4 @@ class BatchSimulator:
 
     def _advance(self, voltages: np.ndarray, ticks: int) -> None:
         self._commands[: self.n], self._commands[self.n :] = voltages, voltages[-1]
-
-        def work(first: int, last: int) -> None:
-            simd_batch.advance(*self._advance_arguments, first, last, ticks)
-            self._mark_invalid(first, last)
-
-        self.run_blocks(work)
-
-    def _mark_invalid(self, first: int, last: int) -> None:
-        layout = (self._like, self._flat, self._blocks.shape[1], self._core.step)
-        simd_batch.mark_invalid(*layout, self._valid, first, last)
+        self.run_blocks(lambda first, last: simd_batch.advance(*self._advance_arguments, first, last, ticks))

@@ -64,7 +64,9 @@ def put(memory: np.ndarray, index: int, value: Member) -> None:
 
 
 @vectorise_loops
-def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, last, count, rates=None, setpoints=None):
+def advance(
+    method, like, memory, columns, keys, ticks, commands, valid, h, n, first, last, count, rates=None, setpoints=None
+):
     """Advance the members of the blocks [first, last) by `count` communication steps.
 
     Args:
@@ -75,6 +77,7 @@ def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, l
         keys: keys of the members' random numbers, shape (members, 2); members are a multiple of WIDTH.
         ticks: tick of each member, shape (members,); advanced.
         commands: voltage [V] of each motor, shape (members, rotors).
+        valid: shape (members,) of bool, cleared for members that are not finite or turn too fast for a step; or None.
         h: step [s].
         n: number of steps in a communication step.
         first: first block.
@@ -101,26 +104,9 @@ def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, l
             for lane in range(WIDTH if i < n * split else 0):
                 split = _parts(like, memory, base + lane, h)
                 _finish(method, like, memory, base + lane, n * h, h / split, i, n * split)
-
-
-@vectorise_loops
-def mark_invalid(like, memory, columns, step, valid, first, last):
-    """Clear `valid` of members of the blocks [first, last) that are not finite, or turn too fast for a step.
-
-    Args:
-        like: a Member.
-        memory: memory of `blocks`, flat.
-        columns: number of columns of a block.
-        step: step of the integrator [s].
-        valid: shape (members,) of bool, changed.
-        first: first block.
-        last: last block (exclusive).
-    """
-    for block in range(first, last):
-        for lane in range(WIDTH):
-            motion = take(like, memory, block * columns * WIDTH + lane).motion
-            sound = finite(motion) & (vector.norm(motion.omega_body) * step <= LARGEST_TURN)
-            valid[block * WIDTH + lane] &= sound
+        if valid is not None:
+            for lane in range(0 if _all_valid(like, memory, base, h) else WIDTH):
+                valid[block * WIDTH + lane] &= _is_valid(like, memory, base + lane, h)
 
 
 @kernel
@@ -142,7 +128,7 @@ def advance_along(method, like, memory, columns, keys, ticks, commands, motions,
                 for column in range(motions.shape[2]):
                     for lane in range(WIDTH):
                         memory[base + column * WIDTH + lane] = motions[k, block * WIDTH + lane, column]
-            advance(method, like, memory, columns, keys, ticks, commands[k], h, n, block, block + 1, 1)
+            advance(method, like, memory, columns, keys, ticks, commands[k], None, h, n, block, block + 1, 1)
             for column in range(trace.shape[2]):
                 for lane in range(WIDTH):
                     trace[k, block * WIDTH + lane, column] = memory[base + column * WIDTH + lane]
@@ -167,6 +153,21 @@ def _alike(like, memory, base, interval, h, split):
         if breaks or multirotor_stepper.parts(p.layout, h) != split or not hooks.all_can_sleep(p.effects, m.memory):
             others += 1
     return others == 0
+
+
+@always_inline
+def _is_valid(like, memory, at, h):
+    motion = take(like, memory, at).motion
+    return finite(motion) & (vector.norm(motion.omega_body) * h <= LARGEST_TURN)
+
+
+@always_inline
+def _all_valid(like, memory, base, h):
+    invalid = 0
+    for lane in range(WIDTH):
+        if not _is_valid(like, memory, base + lane, h):
+            invalid += 1
+    return invalid == 0
 
 
 @always_inline

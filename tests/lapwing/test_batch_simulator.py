@@ -192,8 +192,7 @@ def test_member_with_non_finite_number_is_marked():
         for column in range(batch._motion):
             batch.reset(position_world=(0.0, 0.0, 50.0))
             batch._blocks[0, column, 2] = value
-            batch._mark_invalid(0, 1)
-            assert batch.state.valid.tolist() == [True, True, False]
+            assert batch.step(motor_voltages=np.zeros((3, 4))).valid.tolist() == [True, True, False]
 
 
 @pytest.mark.long
