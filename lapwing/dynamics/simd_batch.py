@@ -9,6 +9,7 @@ of a member are those of `multirotor.advance` in the same order, so the results 
 # mypy: disable-error-code="attr-defined"
 
 from collections.abc import Callable
+from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -33,6 +34,7 @@ from lapwing.kernels.row_packing import construction, leaves, pack_row, row_widt
 from lapwing.kernels.state_tree import finite
 
 WIDTH = 16  # number of members of a block
+LINE = 8  # numbers in a cache line
 LARGEST_TURN = 0.25  # [rad] rotation in a step beyond which no method is accurate
 
 
@@ -55,7 +57,10 @@ def member(parameters: MultirotorParameters, state: MultirotorState) -> Member:
 
 def blocks(members: int, like: Member) -> np.ndarray:
     """Return memory for a number of members, shape (blocks, columns, WIDTH)."""
-    return np.zeros((-(-members // WIDTH), row_width(like), WIDTH))
+    shape = (-(-members // WIDTH), row_width(like), WIDTH)
+    numbers = np.zeros(prod(shape) + LINE)
+    first = -numbers.ctypes.data // numbers.itemsize % LINE  # aligned: no vector is in two cache lines
+    return numbers[first : first + prod(shape)].reshape(shape)
 
 
 def put(memory: np.ndarray, index: int, value: Member) -> None:
@@ -96,10 +101,17 @@ def advance(
                 _begin(like, memory, base + lane, (keys[m, 0], keys[m, 1]), ticks[m], commands, m, n * h)
                 ticks[m] += 1
             split = _parts(like, memory, base, h)
-            alike, part, i = _alike(like, memory, base, n * h, h, split), h / split, 0
-            while alike and i < n * split and _all_asleep(like, memory, base, i, part):
+            part, i = h / split, 0
+            awake = 0  # number of members that cannot take step i with the others; a loop that ends early is slower
+            for lane in range(WIDTH):
+                alike = _is_alike(like, memory, base + lane, n * h, h, split)
+                if not alike or _is_awake(like, memory, base + lane, i, part):
+                    awake += 1
+            while awake == 0 and i < n * split:
                 for lane in range(WIDTH):
                     _airborne_step(method, like, memory, base + lane, i, part)
+                    if _is_awake(like, memory, base + lane, i + 1, part):
+                        awake += 1
                 i += 1
             for lane in range(WIDTH if i < n * split else 0):
                 split = _parts(like, memory, base + lane, h)
@@ -140,19 +152,15 @@ def _parts(like, memory, at, h):
 
 
 @always_inline
-def _alike(like, memory, base, interval, h, split):
-    """Return True if all members of a block have `split` substeps, no breakpoint, and memories that allow sleep.
+def _is_alike(like, memory, at, interval, h, split):
+    """Return True if a member has `split` substeps, no breakpoint, and a memory that lets its effects sleep.
 
     This is constant over a communication step as long as no effect wakes up, so it is not evaluated at each step.
     """
-    others = 0  # a sum, since a loop that ends early is not vectorised
-    for lane in range(WIDTH):
-        m = take(like, memory, base + lane)
-        p, end = m.parameters, m.start + interval
-        breaks = multirotor_stepper.next_break(p, m.memory, m.start, interval, end, h / split) < math.inf
-        if breaks or multirotor_stepper.parts(p.layout, h) != split or not hooks.all_can_sleep(p.effects, m.memory):
-            others += 1
-    return others == 0
+    m = take(like, memory, at)
+    p, end = m.parameters, m.start + interval
+    breaks = multirotor_stepper.next_break(p, m.memory, m.start, interval, end, h / split) < math.inf
+    return multirotor_stepper.parts(p.layout, h) == split and not breaks and hooks.all_can_sleep(p.effects, m.memory)
 
 
 @always_inline
@@ -184,16 +192,12 @@ def _begin(like, memory, at, key, tick, commands, member, interval):
 
 
 @always_inline
-def _all_asleep(like, memory, base, i, h):
-    """Return True if no sleeping effect can reach a member of a block, and none needs error control."""
-    awake = 0
-    for lane in range(WIDTH):
-        m = take(like, memory, base + lane)
-        drive = MultirotorDrive(m.parameters, m.body, m.memory, m.voltage)
-        asleep = hooks.all_sleeping(m.parameters.effects, m.memory, motion_of(m.parameters.layout, m.motion), h)
-        if multirotor_stepper.switches(drive, m.start + i * h, m.motion, h) or not asleep:
-            awake += 1
-    return awake == 0
+def _is_awake(like, memory, at, i, h):
+    """Return True if a sleeping effect can reach a member in step i, or the member needs error control."""
+    m = take(like, memory, at)
+    drive = MultirotorDrive(m.parameters, m.body, m.memory, m.voltage)
+    asleep = hooks.all_sleeping(m.parameters.effects, m.memory, motion_of(m.parameters.layout, m.motion), h)
+    return multirotor_stepper.switches(drive, m.start + i * h, m.motion, h) or not asleep
 
 
 @always_inline
