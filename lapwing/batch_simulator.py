@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from functools import cached_property
+from itertools import pairwise
 from os import cpu_count
 from pathlib import Path
 from typing import NamedTuple
@@ -216,14 +217,14 @@ class BatchSimulator:
         self._fill()
 
     def run_blocks(self, work: Callable[[int, int], None]) -> None:
-        """Call work(first, last) for parts of the blocks, one part for each core, in threads."""
+        """Call work(first, last) for parts of the blocks, one part for each core, in this and other threads."""
         count = len(self._blocks)
         parts = min(cpu_count() or 1, count)
-        if parts == 1:
-            work(0, count)
-            return
         edges = [count * k // parts for k in range(parts + 1)]
-        list(self._pool.map(work, edges[:-1], edges[1:]))
+        others = [self._pool.submit(work, *part) for part in pairwise(edges[1:])]
+        work(edges[0], edges[1])
+        for other in others:
+            other.result()
 
     def advance_under_rates(self, first: int, last: int, ticks: int) -> None:
         """Advance the blocks [first, last) under the rows of `setpoints`."""
