@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property
+from functools import cached_property, partial
 from itertools import pairwise
 from os import cpu_count
 from pathlib import Path
@@ -228,13 +228,13 @@ class BatchSimulator:
 
     def advance_under_rates(self, first: int, last: int, ticks: int) -> None:
         """Advance the blocks [first, last) under the rows of `setpoints`."""
-        simd_batch.advance(*self._advance_arguments, first, last, ticks, self._controller, self.setpoints)
+        self._advance_blocks(first, last, ticks, self._controller, self.setpoints)
 
     @cached_property
-    def _advance_arguments(self) -> tuple:
-        """First arguments of `simd_batch.advance`."""
+    def _advance_blocks(self) -> Callable[..., None]:
+        """`simd_batch.advance` with the arguments that stay the same."""
         memory = (self._like, self._flat, self._blocks.shape[1], self._keys, self._ticks, self._commands, self._valid)
-        return (self._core.method, *memory, self._core.step, self._core.steps)
+        return partial(simd_batch.advance, self._core.method, *memory, self._core.step, self._core.steps)
 
     @cached_property
     def _controller(self) -> RateController:
@@ -266,4 +266,4 @@ class BatchSimulator:
 
     def _advance(self, voltages: np.ndarray, ticks: int) -> None:
         self._commands[: self.n], self._commands[self.n :] = voltages, voltages[-1]
-        self.run_blocks(lambda first, last: simd_batch.advance(*self._advance_arguments, first, last, ticks))
+        self.run_blocks(lambda first, last: self._advance_blocks(first, last, ticks))
