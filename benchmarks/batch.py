@@ -45,7 +45,7 @@ def rates(scene: str) -> tuple[float, float, float]:
     core, volts = batch._core, np.full((N, 4), 31.6)
     options = (core.method, batch._like, batch._blocks.reshape(-1), batch._blocks.shape[1], batch._keys, batch._ticks)
     together = best(lambda: batch._advance(volts, TICKS))
-    single = best(lambda: kernels.advance(*options, volts, core.step, core.steps, 0, N // kernels.WIDTH, TICKS))
+    single = best(lambda: kernels.advance(*options, volts, None, core.step, core.steps, 0, N // kernels.WIDTH, TICKS))
     state = resolve(load(scene)).services["plant"].parameters.start.vehicle
     high = state.motion._replace(position_world=(0.0, 0.0, 2000.0), rotor_speed=(330.0,) * 4)
     start = state._replace(motion=high)

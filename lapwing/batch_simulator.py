@@ -2,10 +2,11 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
-from functools import cached_property
+from functools import cached_property, partial
+from itertools import pairwise
 from os import cpu_count
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -216,25 +217,24 @@ class BatchSimulator:
         self._fill()
 
     def run_blocks(self, work: Callable[[int, int], None]) -> None:
-        """Call work(first, last) for parts of the blocks, one part for each core, in threads."""
+        """Call work(first, last) for parts of the blocks, one part for each core, in this and other threads."""
         count = len(self._blocks)
         parts = min(cpu_count() or 1, count)
-        if parts == 1:
-            work(0, count)
-            return
         edges = [count * k // parts for k in range(parts + 1)]
-        list(self._pool.map(work, edges[:-1], edges[1:]))
+        others = [self._pool.submit(work, *part) for part in pairwise(edges[1:])]
+        work(edges[0], edges[1])
+        for other in others:
+            other.result()
 
     def advance_under_rates(self, first: int, last: int, ticks: int) -> None:
         """Advance the blocks [first, last) under the rows of `setpoints`."""
-        simd_batch.advance(*self._advance_arguments, first, last, ticks, self._controller, self.setpoints)
-        self._mark_invalid(first, last)
+        self._advance_blocks(first, last, ticks, self._controller, self.setpoints)
 
     @cached_property
-    def _advance_arguments(self) -> tuple[Any, Any, np.ndarray, int, np.ndarray, np.ndarray, np.ndarray, float, int]:
-        """First arguments of `simd_batch.advance`."""
-        memory = (self._like, self._flat, self._blocks.shape[1], self._keys, self._ticks, self._commands)
-        return (self._core.method, *memory, self._core.step, self._core.steps)
+    def _advance_blocks(self) -> Callable[..., None]:
+        """`simd_batch.advance` with the arguments that stay the same."""
+        memory = (self._like, self._flat, self._blocks.shape[1], self._keys, self._ticks, self._commands, self._valid)
+        return partial(simd_batch.advance, self._core.method, *memory, self._core.step, self._core.steps)
 
     @cached_property
     def _controller(self) -> RateController:
@@ -266,13 +266,4 @@ class BatchSimulator:
 
     def _advance(self, voltages: np.ndarray, ticks: int) -> None:
         self._commands[: self.n], self._commands[self.n :] = voltages, voltages[-1]
-
-        def work(first: int, last: int) -> None:
-            simd_batch.advance(*self._advance_arguments, first, last, ticks)
-            self._mark_invalid(first, last)
-
-        self.run_blocks(work)
-
-    def _mark_invalid(self, first: int, last: int) -> None:
-        layout = (self._flat, self._blocks.shape[1], self._motion, self._core.step)
-        simd_batch.mark_invalid(*layout, self._valid, first, last)
+        self.run_blocks(lambda first, last: self._advance_blocks(first, last, ticks))

@@ -9,6 +9,7 @@ of a member are those of `multirotor.advance` in the same order, so the results 
 # mypy: disable-error-code="attr-defined"
 
 from collections.abc import Callable
+from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -30,8 +31,10 @@ from lapwing.dynamics.vehicles.multirotor_equations import (
 from lapwing.kernels import always_inline, kernel, math, vectorise_loops
 from lapwing.kernels.codegen import compile_source, generic, map_index
 from lapwing.kernels.row_packing import construction, leaves, pack_row, row_width
+from lapwing.kernels.state_tree import finite
 
 WIDTH = 16  # number of members of a block
+LINE = 8  # numbers in a cache line
 LARGEST_TURN = 0.25  # [rad] rotation in a step beyond which no method is accurate
 
 
@@ -54,7 +57,10 @@ def member(parameters: MultirotorParameters, state: MultirotorState) -> Member:
 
 def blocks(members: int, like: Member) -> np.ndarray:
     """Return memory for a number of members, shape (blocks, columns, WIDTH)."""
-    return np.zeros((-(-members // WIDTH), row_width(like), WIDTH))
+    shape = (-(-members // WIDTH), row_width(like), WIDTH)
+    numbers = np.zeros(prod(shape) + LINE)
+    first = -numbers.ctypes.data // numbers.itemsize % LINE  # aligned: no vector is in two cache lines
+    return numbers[first : first + prod(shape)].reshape(shape)
 
 
 def put(memory: np.ndarray, index: int, value: Member) -> None:
@@ -63,7 +69,9 @@ def put(memory: np.ndarray, index: int, value: Member) -> None:
 
 
 @vectorise_loops
-def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, last, count, rates=None, setpoints=None):
+def advance(
+    method, like, memory, columns, keys, ticks, commands, valid, h, n, first, last, count, rates=None, setpoints=None
+):
     """Advance the members of the blocks [first, last) by `count` communication steps.
 
     Args:
@@ -74,6 +82,7 @@ def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, l
         keys: keys of the members' random numbers, shape (members, 2); members are a multiple of WIDTH.
         ticks: tick of each member, shape (members,); advanced.
         commands: voltage [V] of each motor, shape (members, rotors).
+        valid: shape (members,) of bool, cleared for members that are not finite or turn too fast for a step; or None.
         h: step [s].
         n: number of steps in a communication step.
         first: first block.
@@ -86,46 +95,30 @@ def advance(method, like, memory, columns, keys, ticks, commands, h, n, first, l
         base = block * columns * WIDTH
         for _ in range(count):
             for lane in range(WIDTH):
-                m = block * WIDTH + lane
+                m = np.uintp(block * WIDTH + lane)  # unsigned, so that indexing has no check for negative values
                 if rates is not None:
                     rate_control.command(rates, memory, base + lane, WIDTH, setpoints, commands, m)
                 _begin(like, memory, base + lane, (keys[m, 0], keys[m, 1]), ticks[m], commands, m, n * h)
                 ticks[m] += 1
-            split, alike = _parts(like, memory, base, h), True
-            for lane in range(WIDTH):
-                alike = alike and _parts(like, memory, base + lane, h) == split
-                alike = alike and not _breaks(like, memory, base + lane, n * h, h / split)
+            split = _parts(like, memory, base, h)
             part, i = h / split, 0
-            while alike and i < n * split and _all_asleep(like, memory, base, i, part):
+            awake = 0  # number of members that cannot take step i with the others; a loop that ends early is slower
+            for lane in range(WIDTH):
+                alike = _is_alike(like, memory, base + lane, n * h, h, split)
+                if not alike or _is_awake(like, memory, base + lane, i, part):
+                    awake += 1
+            while awake == 0 and i < n * split:
                 for lane in range(WIDTH):
                     _airborne_step(method, like, memory, base + lane, i, part)
+                    if _is_awake(like, memory, base + lane, i + 1, part):
+                        awake += 1
                 i += 1
             for lane in range(WIDTH if i < n * split else 0):
                 split = _parts(like, memory, base + lane, h)
                 _finish(method, like, memory, base + lane, n * h, h / split, i, n * split)
-
-
-@kernel
-def mark_invalid(memory, columns, motion, step, valid, first, last):
-    """Clear `valid` of members of the blocks [first, last) that are not finite, or turn too fast for a step.
-
-    Args:
-        memory: memory of `blocks`, flat.
-        columns: number of columns of a block.
-        motion: columns of the motion.
-        step: step of the integrator [s].
-        valid: shape (members,) of bool, changed.
-        first: first block.
-        last: last block (exclusive).
-    """
-    for m in range(first * WIDTH, last * WIDTH):
-        at = (m // WIDTH) * columns * WIDTH + m % WIDTH
-        finite = True
-        for k in range(motion):
-            finite = finite and math.isfinite(memory[at + k * WIDTH])
-        turn = rate_control.omega_body(memory, at, WIDTH)
-        if not (finite and vector.norm(turn) * step <= LARGEST_TURN):
-            valid[m] = False
+        if valid is not None:
+            for lane in range(0 if _all_valid(like, memory, base, h) else WIDTH):
+                valid[block * WIDTH + lane] &= _is_valid(like, memory, base + lane, h)
 
 
 @kernel
@@ -147,7 +140,7 @@ def advance_along(method, like, memory, columns, keys, ticks, commands, motions,
                 for column in range(motions.shape[2]):
                     for lane in range(WIDTH):
                         memory[base + column * WIDTH + lane] = motions[k, block * WIDTH + lane, column]
-            advance(method, like, memory, columns, keys, ticks, commands[k], h, n, block, block + 1, 1)
+            advance(method, like, memory, columns, keys, ticks, commands[k], None, h, n, block, block + 1, 1)
             for column in range(trace.shape[2]):
                 for lane in range(WIDTH):
                     trace[k, block * WIDTH + lane, column] = memory[base + column * WIDTH + lane]
@@ -159,11 +152,30 @@ def _parts(like, memory, at, h):
 
 
 @always_inline
-def _breaks(like, memory, at, interval, h):
-    """Return True if a member has a breakpoint in its communication step."""
+def _is_alike(like, memory, at, interval, h, split):
+    """Return True if a member has `split` substeps, no breakpoint, and a memory that lets its effects sleep.
+
+    This is constant over a communication step as long as no effect wakes up, so it is not evaluated at each step.
+    """
     m = take(like, memory, at)
-    end = m.start + interval
-    return multirotor_stepper.next_break(m.parameters, m.memory, m.start, interval, end, h) < math.inf
+    p, end = m.parameters, m.start + interval
+    breaks = multirotor_stepper.next_break(p, m.memory, m.start, interval, end, h / split) < math.inf
+    return multirotor_stepper.parts(p.layout, h) == split and not breaks and hooks.all_can_sleep(p.effects, m.memory)
+
+
+@always_inline
+def _is_valid(like, memory, at, h):
+    motion = take(like, memory, at).motion
+    return finite(motion) & (vector.norm(motion.omega_body) * h <= LARGEST_TURN)
+
+
+@always_inline
+def _all_valid(like, memory, base, h):
+    invalid = 0
+    for lane in range(WIDTH):
+        if not _is_valid(like, memory, base + lane, h):
+            invalid += 1
+    return invalid == 0
 
 
 @always_inline
@@ -180,16 +192,12 @@ def _begin(like, memory, at, key, tick, commands, member, interval):
 
 
 @always_inline
-def _all_asleep(like, memory, base, i, h):
-    """Return True if no sleeping effect can reach a member of a block, and none needs error control."""
-    awake = 0
-    for lane in range(WIDTH):
-        m = take(like, memory, base + lane)
-        drive = MultirotorDrive(m.parameters, m.body, m.memory, m.voltage)
-        asleep = hooks.all_sleeping(m.parameters.effects, m.memory, motion_of(m.parameters.layout, m.motion), h)
-        if multirotor_stepper.switches(drive, m.start + i * h, m.motion, h) or not asleep:
-            awake += 1
-    return awake == 0
+def _is_awake(like, memory, at, i, h):
+    """Return True if a sleeping effect can reach a member in step i, or the member needs error control."""
+    m = take(like, memory, at)
+    drive = MultirotorDrive(m.parameters, m.body, m.memory, m.voltage)
+    asleep = hooks.all_sleeping(m.parameters.effects, m.memory, motion_of(m.parameters.layout, m.motion), h)
+    return multirotor_stepper.switches(drive, m.start + i * h, m.motion, h) or not asleep
 
 
 @always_inline

@@ -207,6 +207,15 @@ def test_member_that_turns_too_fast_is_marked():
     assert batch.reset([1]).valid.all()
 
 
+def test_member_with_non_finite_number_is_marked():
+    batch = lapwing.BatchSimulator("hover", 3)
+    for value in (np.nan, np.inf, -np.inf):
+        for column in range(batch._motion):
+            batch.reset(position_world=(0.0, 0.0, 50.0))
+            batch._blocks[0, column, 2] = value
+            assert batch.step(motor_voltages=np.zeros((3, 4))).valid.tolist() == [True, True, False]
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("ground", ["slope", "bumps", "steps", "box and cylinder", "grid", "rotor table"])
 def test_members_over_any_terrain_have_bits_of_one_alone(ground):

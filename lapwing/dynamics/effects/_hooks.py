@@ -24,7 +24,9 @@ Hooks between evaluations:
     mass_properties      (e, memory, body) -> MassProperties         for the next communication step
     discrete_update      (e, memory, s, rotors, key, tick, interval) -> memory    once per communication step, before
                          its first integrator step; s and rotors exclude effects that can sleep
-    is_sleeping          (e, memory, motion, h) -> bool              True if the effect cannot act in the next step
+    is_sleeping          (e, motion, h) -> bool                      True if the effect cannot act in the next step
+    can_sleep            (e, memory) -> bool                         False while its memory keeps the effect awake even
+                         if `is_sleeping`; constant while steps are taken without the effect
     substeps             (e, memory, motion, h) -> int               least number of substeps of a stiff effect
     wrench_and_rate      (e, memory, motion) -> (force_world, torque_body, rate of its memory)    of a stiff effect
                          whose memory is integrated with the motion; the force is that of its wrench
@@ -91,6 +93,7 @@ substeps = _hook("substeps")
 contact = _hook("contact")
 contact_forces = _hook("contact_forces")
 is_sleeping = _hook("is_sleeping")
+can_sleep = _hook("can_sleep")
 switches = _hook("switches")
 wind = _hook("wind")
 
@@ -247,21 +250,39 @@ all_sleeping = _generate_calls(
     "all_sleeping",
     "is_sleeping",
     "motion, h",
-    "sleeping = f{i}(effects[{i}], memory[{i}], motion, h)",
+    "sleeping = f{i}(effects[{i}], motion, h)",
     "sleeping",
     default="True",
-    more="sleeping = sleeping and f{i}(effects[{i}], memory[{i}], motion, h)",
+    more="sleeping = sleeping and f{i}(effects[{i}], motion, h)",
+)
+all_can_sleep = _generate_calls(
+    "all_can_sleep",
+    "can_sleep",
+    "",
+    "able = f{i}(effects[{i}], memory[{i}])",
+    "able",
+    default="True",
+    more="able = able and f{i}(effects[{i}], memory[{i}])",
 )
 
 
 @generic(inline=True)
 def all_stiff_sleeping(effects: Any, memory: Any, motion: Any, h: Any) -> Callable:
-    """Return True if every stiff effect is sleeping."""
+    """Return True if every stiff effect is sleeping, and can."""
     both = HOOKS["substeps"], HOOKS["is_sleeping"]
-    stiff = [i for i, e in enumerate(effects.types) if all(e.instance_class in hook for hook in both)]
-    names = {f"f{i}": HOOKS["is_sleeping"][effects.types[i].instance_class] for i in stiff}
-    calm = " and ".join(f"f{i}(effects[{i}], memory[{i}], motion, h)" for i in stiff)
-    return compile_source("all_stiff_sleeping(effects, memory, motion, h)", names, f"return {calm or 'True'}")
+    stiff = [
+        (i, e.instance_class) for i, e in enumerate(effects.types) if all(e.instance_class in hook for hook in both)
+    ]
+    names: dict[str, Any] = {}
+    calls = []
+    for hook, arguments in (("is_sleeping", "motion, h"), ("can_sleep", "memory[{i}]")):
+        for i, parameters in stiff:
+            if parameters in HOOKS[hook]:
+                names[f"{hook}{i}"] = HOOKS[hook][parameters]
+                calls.append(f"{hook}{i}(effects[{i}], {arguments.format(i=i)})")
+    return compile_source(
+        "all_stiff_sleeping(effects, memory, motion, h)", names, f"return {' and '.join(calls) or 'True'}"
+    )
 
 
 @generic(inline=True)

@@ -121,6 +121,6 @@ def ceiling_effect(e, memory, s, before):
 
 
 @is_sleeping(CeilingEffect)
-def low(e, memory, motion, h):
+def low(e, motion, h):
     """Return True if no rotor can reach the ceiling effect within a step."""
     return e.height - motion.position_world[2] - 2.0 * h * norm(motion.velocity_world) > e.reach

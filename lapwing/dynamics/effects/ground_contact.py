@@ -11,6 +11,7 @@ from lapwing.dynamics.effects._contact_parameters import (
 )
 from lapwing.dynamics.effects._foot_contact import NO_FOOT, contact_of_feet, in_reach, stance_of
 from lapwing.dynamics.effects._hooks import (
+    can_sleep,
     contact,
     contact_forces,
     is_sleeping,
@@ -30,8 +31,8 @@ from lapwing.kernels.state_tree import largest
 RELAXED = 1e-13  # [m] deflection of friction elements that counts as zero
 
 
-@always_inline
-def _far(e, motion, h):
+@is_sleeping(GroundContact, GroundContactSmooth)
+def far(e, motion, h):
     """Return True if no foot can reach the ground within a step."""
     velocity = motion.velocity_world
     approach = max(-over_plane(e.terrain, velocity), 0.0)
@@ -127,16 +128,10 @@ def forces(e, memory, motion):
     return unchunk4(map_tuple(_on_points, (e, stance), feet, fours), e.feet)
 
 
-@is_sleeping(GroundContact)
-def far(e, memory, motion, h):
-    """Return True well above the ground, if the friction elements have relaxed."""
-    return _far(e, motion, h) and largest(memory) < RELAXED
-
-
-@is_sleeping(GroundContactSmooth)
-def far_smooth(e, memory, motion, h):
-    """Return True well above the ground."""
-    return _far(e, motion, h)
+@can_sleep(GroundContact)
+def relaxed(e, memory):
+    """Return True if the friction elements have relaxed."""
+    return largest(memory) < RELAXED
 
 
 @always_inline

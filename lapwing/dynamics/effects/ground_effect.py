@@ -78,7 +78,7 @@ def ground_effect(e, memory, s, before):
 
 
 @is_sleeping(GroundEffect)
-def high(e, memory, motion, h):
+def high(e, motion, h):
     """Return True if no rotor can reach the ground effect within a step."""
     over, climb = over_plane(e.terrain, motion.position_world), over_plane(e.terrain, motion.velocity_world)
     return over - summit(e.terrain) + 2.0 * h * min(climb, 0.0) > e.highest

@@ -230,7 +230,8 @@ def steps(method, drive, x, start, end, h, first, n):
         for i in range(first, n):
             seen = motion_of(layout, x)
             switching = switches(MultirotorDrive(p, body, memory, voltage), start + i * h, x, h)
-            if not switching and hooks.all_sleeping(p.effects, memory, seen, h):
+            asleep = hooks.all_sleeping(p.effects, memory, seen, h) and hooks.all_can_sleep(p.effects, memory)
+            if asleep and not switching:
                 x = _step(method, airborne, start + i * h, x, h)
                 continue
             if switching or not hooks.all_stiff_sleeping(p.effects, memory, seen, h):

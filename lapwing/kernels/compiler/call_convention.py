@@ -18,6 +18,7 @@ from numba.core.imputils import impl_ret_new_ref
 from numba.core.lowering import Lower
 
 WIDEST = '"prefer-vector-width"="512"'  # by default LLVM uses half of the vector registers of Intel processors
+CACHE_LINE = 64  # [bytes] alignment of the stack, so that no vector there is in two cache lines
 WHOLE = ".whole"  # suffix of the names of functions with this convention
 
 
@@ -124,6 +125,7 @@ class KernelLower(Lower):
         super().setup_function(fndesc)
         if self.library.vectorise_loops:
             set.add(self.function.attributes, WIDEST)  # which llvmlite rejects as unknown
+            self.function.attributes.alignstack = CACHE_LINE
 
     def incref(self, typ: types.Type, val: Any) -> None:
         """Count a new reference if the type holds arrays."""

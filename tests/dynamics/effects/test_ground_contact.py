@@ -9,6 +9,7 @@ from scipy.optimize import brentq
 from scipy.spatial.transform import Rotation
 
 from lapwing.dynamics import effects
+from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.integrators import get
 from lapwing.dynamics.lie.quaternion import Quaternion
@@ -48,6 +49,16 @@ def settled(drone, angle=0.0, **table):
     depth = brentq(lambda d: 1e6 * d * (d / 1e-4) ** 2 * (3 - 2 * d / 1e-4) - load, 0.0, 1e-4)
     p, state = setting(drone, -depth, angle, **table)
     return p, run(p, state, 3.0)
+
+
+def test_stretched_elements_stay_awake_in_air(drone):
+    p, state = setting(drone, 50.0)
+    relaxed, motion = state.memory, state.motion
+    stretched = tuple(((1e-6, 0.0, 0.0), *feet[1:]) if feet else feet for feet in relaxed)
+    assert hooks.all_sleeping(p.effects, relaxed, motion, 1e-3)
+    for memory, able in ((relaxed, True), (stretched, False)):
+        assert hooks.all_can_sleep(p.effects, memory) == able
+        assert hooks.all_stiff_sleeping(p.effects, memory, motion, 1e-3) == able
 
 
 def test_rests_for_hour_without_drift(drone):
