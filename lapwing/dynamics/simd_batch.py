@@ -9,7 +9,6 @@ of a member are those of `multirotor.advance` in the same order, so the results 
 # mypy: disable-error-code="attr-defined"
 
 from collections.abc import Callable
-from math import prod
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -57,10 +56,11 @@ def member(parameters: MultirotorParameters, state: MultirotorState) -> Member:
 
 def blocks(members: int, like: Member) -> np.ndarray:
     """Return memory for a number of members, shape (blocks, columns, WIDTH)."""
-    shape = (-(-members // WIDTH), row_width(like), WIDTH)
-    numbers = np.zeros(prod(shape) + LINE)
+    count, columns = -(-members // WIDTH), row_width(like)
+    size = count * columns * WIDTH
+    numbers = np.zeros(size + LINE)
     first = -numbers.ctypes.data // numbers.itemsize % LINE  # aligned: no vector is in two cache lines
-    return numbers[first : first + prod(shape)].reshape(shape)
+    return numbers[first : first + size].reshape(count, columns, WIDTH)
 
 
 def put(memory: np.ndarray, index: int, value: Member) -> None:

@@ -191,10 +191,11 @@ def _equipment(scene: "Scene") -> list[Parameter]:
     sensors = scene.tables("sensors")
     mag, baro, gps = (float(not sensors or name in sensors) for name in ("magnetometer", "barometer", "gps"))
     distance = float(len({"sonar", "rangefinder"} & set(sensors)))
+    most = distance or float(not sensors)
     return [
         Parameter("SYS_HAS_MAG", "", mag, 0, mag, "0: arming requires no readings of the magnetometer", True),
         Parameter("SYS_HAS_BARO", "", baro, 0, baro, "0: arming requires no readings of the barometer", True),
-        Parameter("SYS_HAS_NUM_DIST", "", distance, 0, distance, "0: arming requires no distance readings", True),
+        Parameter("SYS_HAS_NUM_DIST", "", distance, 0, most, "0: arming requires no distance readings", True),
         Parameter("SYS_HAS_GPS", "", gps, 0, gps, "0: the autopilot gets no GPS readings, from the start", True, True),
         *([_GRIPPER] if "payload_release" in scene.tables("effects") else ()),
     ]

@@ -79,8 +79,8 @@ def test_gain_has_no_step_at_edge_or_far_below(drone, situation):
 
 def test_sleeps_only_out_of_reach(drone, situation):
     e = make(drone)
-    assert low.py_func(e, (), situation(position=(0, 0, CEILING - e.reach - 0.1)).motion, 0.001)
-    assert not low.py_func(e, (), situation(position=(0, 0, CEILING - e.reach + 0.1)).motion, 0.001)
+    assert low.py_func(e, situation(position=(0, 0, CEILING - e.reach - 0.1)).motion, 0.001)
+    assert not low.py_func(e, situation(position=(0, 0, CEILING - e.reach + 0.1)).motion, 0.001)
     turned = situation(position=(0, 0, CEILING - e.reach), turn=(1.5, 0, 0))
     assert factors(e, turned)[0] == pytest.approx([1.0] * 4, abs=0)
 

@@ -33,7 +33,7 @@ def test_lower_rotor_gets_more(drone, situation):
 def test_ground_effect_sleeps_only_without_influence(drone, situation):
     (e,) = effects.from_scene({"ground_effect": {}}, drone)
     motion = situation(position=(0, 0, e.highest + 0.01), velocity=(0, 0, -4)).motion
-    assert high.py_func(e, (), motion, 0.001)
-    assert not high.py_func(e, (), motion, 0.01)
+    assert high.py_func(e, motion, 0.001)
+    assert not high.py_func(e, motion, 0.01)
     s = situation(position=(0, 0, e.highest), turn=(1.2, 0.5, 0))
     assert ground_effect.py_func(e, (), s, NO_FACTORS).thrust == (1.0,) * 4

@@ -101,8 +101,8 @@ def test_forward_flight_takes_gain_away(drone, situation):
 
 def test_sleeps_only_without_influence(drone, situation):
     e = make(drone)
-    assert high.py_func(e, (), situation(position=(0, 0, e.highest + 0.01), velocity=(0, 0, -4)).motion, 0.001)
-    assert not high.py_func(e, (), situation(position=(0, 0, e.highest - 0.01)).motion, 0.001)
+    assert high.py_func(e, situation(position=(0, 0, e.highest + 0.01), velocity=(0, 0, -4)).motion, 0.001)
+    assert not high.py_func(e, situation(position=(0, 0, e.highest - 0.01)).motion, 0.001)
     assert thrust(e, situation(position=(0, 0, e.highest), turn=(1.2, 0.5, 0))) == pytest.approx([1.0] * 4, abs=0)
 
 
