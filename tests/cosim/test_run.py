@@ -119,12 +119,14 @@ def started(tmp_path):
     if not Path("/proc/self/task").exists():
         pytest.skip("finds processes in /proc")
     runs = []
+    former = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup ignores it, and processes inherit that
 
     def start(key_prefix, *more):
         runs.append(Running(tmp_path, key_prefix, *more))
         return runs[-1]
 
     yield start
+    signal.signal(signal.SIGHUP, former)
     for run in runs:
         run.kill()
 
