@@ -86,8 +86,8 @@ def export_part(setup: RunConfig, name: str) -> ExportedPart:
     diagram = BlockDiagram(setup, own, 1)
     parts: Sequence[Any] = diagram._parts
     replacing = [failures for part in parts if (failures := _propeller_failures(part))]
-    blocks = _scheduled(diagram)
-    replacements = _replacements(blocks, replacing)
+    scheduled = _scheduled(diagram)
+    blocks = _with_replacements(scheduled, replacing)
     produced = {port.name for part in parts for port in part.outputs}
     lags: dict[str, int] = {}
     for part in parts:
@@ -95,7 +95,7 @@ def export_part(setup: RunConfig, name: str) -> ExportedPart:
             if needed.port not in produced:
                 lags[needed.port] = min(lags.get(needed.port, 1), needed.delay)
     published = [port for each in names for port in setup.services[each].ports]
-    roots = [(block.name, block.bound.cell) for block in (*blocks, *replacements) if block.bound]
+    roots = [(block.name, block.bound.cell) for block in blocks if block.bound]
     image = image_of(roots, diagram._rows)
     python = {block.name for block in blocks if not block.bound}
     actions = [a for a in record_actions(setup, services, image, diagram) if a.block in python] if python else []
@@ -108,8 +108,8 @@ def export_part(setup: RunConfig, name: str) -> ExportedPart:
     return ExportedPart(
         name,
         setup,
-        [*blocks, *replacements],
-        len(replacements),
+        blocks,
+        len(blocks) - len(scheduled),
         sorted({tick for each in replacing for tick in each.events}),
         [boundary(diagram.ports[port], lag) for port, lag in lags.items()],
         [boundary(port, 0) for port in published if port.name in diagram._rows],
@@ -143,9 +143,11 @@ def _scheduled(diagram: BlockDiagram) -> list[ScheduledBlock]:
     ]
 
 
-def _replacements(blocks: list[ScheduledBlock], replacing: Sequence[PropellerFailures]) -> list[ScheduledBlock]:
-    """Return the blocks that replace others after propeller failures, and link each block to its replacement."""
-    rows = list(blocks)
+def _with_replacements(
+    scheduled: Sequence[ScheduledBlock], replacing: Sequence[PropellerFailures]
+) -> list[ScheduledBlock]:
+    """Return scheduled blocks linked to those that replace them after propeller failures, which follow at the end."""
+    rows = list(scheduled)
     latest = {block.name: k for k, block in enumerate(rows)}
     for failures in replacing:
         for tick, replaced in sorted(failures.replacements.items()):
@@ -154,8 +156,7 @@ def _replacements(blocks: list[ScheduledBlock], replacing: Sequence[PropellerFai
                 latest[part.name] = len(rows)
                 rows.append(rows[k]._replace(part=part, bound=bound, name=f"{part.name}.from_tick_{tick}"))
                 rows[k] = rows[k]._replace(until=tick, following=latest[part.name])
-    blocks[:] = rows[: len(blocks)]
-    return rows[len(blocks) :]
+    return rows
 
 
 def _choices(setup: RunConfig) -> str:

@@ -10,7 +10,7 @@ from lapwing.services.mavlink import firmware
 from lapwing.services.mavlink.actuator_metadata import actuators
 from lapwing.services.mavlink.event_metadata import events
 from lapwing.services.mavlink.file_server import crc32
-from lapwing.services.mavlink.px4_facts import COMPONENT_ID, SYSTEM_ID, Fact, output_function
+from lapwing.services.mavlink.px4_facts import Fact, output_function
 from lapwing.services.mavlink.vehicle_description import VehicleDescription
 
 GENERAL, PARAMETERS = "etc/extras/component_general.json", "etc/extras/parameters.json"
@@ -57,7 +57,7 @@ def _fact(fact: Fact, value: float) -> dict[str, Any]:
         text = "Property of the vehicle (read-only)"
         return _entry(fact.name, fact.whole, fact.unit, text, value) | {"readOnly": True}
     entry = _entry(fact.name, fact.whole, fact.unit, "As in PX4", value)
-    return entry | ({"rebootRequired": True} if fact.name in (SYSTEM_ID, COMPONENT_ID) else {})
+    return entry | ({"rebootRequired": True} if fact.at_reboot else {})
 
 
 def _entry(name: str, whole: bool, unit: str, text: str, default: float) -> dict[str, Any]:

@@ -23,6 +23,7 @@ class Fact(NamedTuple):
     unit: str = ""
     # returns the autopilot's parameters for a value, or None for an unsupported value; None: read-only
     assign: Callable[[float], Values | None] | None = None
+    at_reboot: bool = False  # a new value takes effect when the link restarts
 
 
 def _translate_action(name: str, counterpart: str, actions: dict[int, int], default: int = 0) -> Fact:
@@ -35,9 +36,9 @@ def _translate_action(name: str, counterpart: str, actions: dict[int, int], defa
     return Fact(name, lambda v: px4_actions.get(int(v.get(counterpart, NOTHING)), default), assign=assign)
 
 
-def _setting(name: str, default: int, allowed: Collection[int]) -> Fact:
+def _setting(name: str, default: int, allowed: Collection[int], at_reboot: bool = False) -> Fact:
     """Return a setting of the link, which has no counterpart in the autopilot."""
-    return Fact(name, lambda _: float(default), assign=lambda x: {} if x in allowed else None)
+    return Fact(name, lambda _: float(default), assign=lambda x: {} if x in allowed else None, at_reboot=at_reboot)
 
 
 SYSTEM_ID, COMPONENT_ID, TYPE = "MAV_SYS_ID", "MAV_COMP_ID", "MAV_TYPE"
@@ -111,8 +112,8 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
     whole |= {output_function(k + 1): FIRST_MOTOR + k for k in range(len(d.rotors))}
     own_type = vehicle_type(len(d.rotors))
     return [
-        _setting(SYSTEM_ID, d.system_id, _IDS),
-        _setting(COMPONENT_ID, mavlink.MAV_COMP_ID_AUTOPILOT1, _IDS),
+        _setting(SYSTEM_ID, d.system_id, _IDS, at_reboot=True),
+        _setting(COMPONENT_ID, mavlink.MAV_COMP_ID_AUTOPILOT1, _IDS, at_reboot=True),
         _setting(TYPE, own_type, {own_type, *_MULTIROTORS}),
         *[Fact(name, lambda _, value=value: float(value)) for name, value in whole.items()],  # type: ignore[misc]
         *[Fact(f"SENS_BOARD_{axis}_OFF", lambda _: 0.0, False, "deg") for axis in "XYZ"],

@@ -10,17 +10,17 @@ import numpy as np
 import pytest
 from recorded_ports import RecordedPorts, scene_config
 
-fmpy = pytest.importorskip("fmpy")
-from driven_fmu import Slave, assert_recorded_outputs  # noqa: E402
-from fmpy import read_model_description, simulate_fmu  # noqa: E402
-from fmpy.validation import validate_fmu  # noqa: E402
+pytest.importorskip("fmpy")
+from driven_fmu import Slave, assert_recorded_outputs
+from fmpy import read_model_description, simulate_fmu
+from fmpy.validation import validate_fmu
 
-from lapwing.cosim.diagram.topic_encoder import encode  # noqa: E402
-from lapwing.fmi.exported_part import export_part  # noqa: E402
-from lapwing.fmi.fmu import export_fmu  # noqa: E402
-from lapwing.fmi.variables import Variable, variables_of  # noqa: E402
-from lapwing.messages.digest import Digest  # noqa: E402
-from lapwing.messages.topics import TRUTH  # noqa: E402
+from lapwing.cosim.diagram.topic_encoder import encode
+from lapwing.fmi.exported_part import export_part
+from lapwing.fmi.fmu import export_fmu
+from lapwing.fmi.variables import Variable, variables_of
+from lapwing.messages.digest import Digest
+from lapwing.messages.topics import TRUTH
 
 
 def run_command(*arguments: str) -> subprocess.CompletedProcess[str]:

@@ -9,14 +9,14 @@ import pytest
 from recorded_ports import RecordedPorts, scene_config
 from test_library import built
 
-fmpy = pytest.importorskip("fmpy")
-from driven_fmu import Slave, assert_recorded_outputs  # noqa: E402
-from fmpy import simulate_fmu  # noqa: E402
-from fmpy.validation import validate_fmu  # noqa: E402
+pytest.importorskip("fmpy")
+from driven_fmu import Slave, assert_recorded_outputs
+from fmpy import read_model_description, simulate_fmu
+from fmpy.validation import validate_fmu
 
-from lapwing.cosim.config.run_config import RunConfig  # noqa: E402
-from lapwing.fmi.exported_part import export_part  # noqa: E402
-from lapwing.fmi.fmu import export_fmu  # noqa: E402
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.fmi.exported_part import export_part
+from lapwing.fmi.fmu import export_fmu
 
 pytestmark = pytest.mark.long
 LOCKED, FREE = '{time=2.601, propeller=2, failure="locked"}', '{time=2.602, propeller=1, failure="free"}'
@@ -86,7 +86,7 @@ def test_fmi_2_has_recorded_outputs(tmp_path: Path) -> None:
     names = [f"{SPEED}[{k}]" for k in range(4)]
     result = simulate_fmu(str(path), output=names, stop_time=(recorded.ticks - 1) * TICK, output_interval=TICK)
     speeds = np.array([result[name] for name in names]).T
-    column = [v.name for v in fmpy.read_model_description(str(path)).modelVariables if v.name.startswith("truth.")]
+    column = [v.name for v in read_model_description(str(path)).modelVariables if v.name.startswith("truth.")]
     first = column.index(names[0])
     assert np.array_equal(speeds, [recorded.latest("truth", k)[first : first + 4] for k in range(recorded.ticks)])
 

@@ -48,6 +48,7 @@ from lapwing.messages.types import (
     Vector3,
     VehicleState,
 )
+from lapwing.studies.complete_file import complete_file
 from lapwing.studies.flight_import.recording import Recording, Series
 
 VEHICLE = "drone1"
@@ -100,7 +101,7 @@ SENSORS: dict[str, tuple[Topic, Callable[[Header, Sequence[float]], Any]]] = {
 def write_log(path: Path, flight: Recording, source: str) -> None:
     """Write a recording as a log. The topics of the motion omit invalid samples; the metadata has their number.
 
-    The log is written beside `path`, with the ending `.part`, and replaces it when it is complete.
+    The log replaces `path` when it is complete; see `complete_file`.
 
     Args:
         path: path of the log.
@@ -118,16 +119,9 @@ def write_log(path: Path, flight: Recording, source: str) -> None:
         "unknown_topics": ", ".join(flight.unknown),
     }
     messages = heapq.merge(_motion(flight), *_readings(flight), key=lambda entry: entry[0])
-    part = path.with_name(f"{path.name}.part")
-    log = LogWriter(part, metadata, {})
-    try:
-        with log:
-            for time_ns, topic, message in messages:
-                log.write(topic.key(VEHICLE), type(message), message.encode(), time_ns)
-        part.replace(path)
-    except BaseException:  # also an interrupt
-        part.unlink(missing_ok=True)
-        raise
+    with complete_file(path) as file, LogWriter(file, metadata, {}) as log:
+        for time_ns, topic, message in messages:
+            log.write(topic.key(VEHICLE), type(message), message.encode(), time_ns)
 
 
 def _motion(flight: Recording) -> Iterator[tuple[int, Topic, Any]]:

@@ -86,8 +86,8 @@ print(os.environ.get("ZENOH_RUNTIME"))
 """
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="names of threads are told by Linux's /proc")
-def test_one_runtime_for_all_sessions_and_none_for_programs_started_later():
+@pytest.mark.skipif(sys.platform != "linux", reason="reads the names of threads from /proc, which only Linux has")
+def test_child_process_does_not_inherit_zenoh_runtime_setting():
     """In a program with one runtime thread, a callback that sends several fragments waits for itself."""
     (endpoint,) = loopback_endpoints(["a"]).values()
     environment = {key: value for key, value in os.environ.items() if key != "ZENOH_RUNTIME"}

@@ -6,7 +6,7 @@ from flight_recordings import INTERVAL, real_flights, simulated, write_csv
 from scipy.interpolate import CubicSpline
 
 from lapwing.studies.flight_import.column_mapping import load_mapping
-from lapwing.studies.flight_import.csv_flight import read_csv_flight
+from lapwing.studies.flight_import.csv_flight import from_columns, read_csv_flight
 from lapwing.studies.flight_import.open_flight import open_flight
 from lapwing.studies.flight_import.rotation_arrays import from_ned_frd, from_vector, product, rotate, rotation_vector
 from lapwing.studies.flight_import.time_alignment import clock_drift, time_offset
@@ -145,3 +145,16 @@ def test_real_flights_import_with_their_faults():
     assert result.faults["motor out of range"] > 500
     assert result.faults["battery out of range"] > 100
     assert 0.6 < result.valid.mean() < 0.9
+
+
+def test_fast_csv_keeps_its_time_base(tmp_path):
+    mapping = load_mapping("betaflight")
+    n = 3200
+    time = np.floor(312.5 * np.arange(n))
+    table = {column: np.zeros(n) for column in mapping.columns}
+    table |= {"time (us)": time, "accSmooth[2]": np.full(n, 2048.0), "vbatLatest (V)": np.full(n, 16.0)}
+    table |= {f"motor[{k}]": np.full(n, 500.0) for k in range(4)} | {"gyroADC[0]": np.sin(time * 1e-6)}
+    result = from_columns(tmp_path / "f.csv", table, mapping)
+    at = result.interval * np.arange(len(result))
+    assert at[-1] == pytest.approx(time[-1] * 1e-6, abs=1e-3)
+    assert result.omega[:, 0] == pytest.approx(np.radians(np.sin(at)), abs=1e-6)

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from flight_recordings import INTERVAL, real_flights, simulated, write_csv
 
+from lapwing.cosim.log import LogWriter
 from lapwing.studies.flight_import.open_flight import open_flight
 from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.flight_import.ulog_flight import read_ulog_flight
@@ -122,3 +123,16 @@ def test_damaged_dataflash_log_is_imported_without_lines_of_its_parser(tmp_path)
     result = run("import", tmp_path / "a.bin", "--out", tmp_path / "a.mcap")
     assert (result.returncode, result.stderr) == (0, "")
     assert "bad header" not in result.stdout
+
+
+def test_failed_import_keeps_former_log(tmp_path, flight, monkeypatch):
+    def interrupted(*_):
+        raise KeyboardInterrupt
+
+    out = tmp_path / "out.mcap"
+    out.write_bytes(b"former")
+    monkeypatch.setattr(LogWriter, "flush", interrupted)  # as the last messages are written
+    with pytest.raises(KeyboardInterrupt):
+        write_log(out, flight, "f.bin")
+    assert [path.name for path in tmp_path.iterdir()] == ["out.mcap"]
+    assert out.read_bytes() == b"former"

@@ -1,18 +1,15 @@
 """Imports of logs with several sources, restarts, unknown values and other vehicles."""
 
 from dataclasses import replace
-from types import SimpleNamespace
 
 import flight_writers
 import numpy as np
 import pytest
 from flight_recordings import BATTERY
-from flight_writers import DATAFLASH, GRAVITY, INTERVAL, SAMPLES, dataflash_rows, telemetry, write_bin, write_tlog
+from flight_writers import DATAFLASH, SAMPLES, dataflash_rows, telemetry, write_bin, write_tlog
 from pymavlink.dialects.v20 import common as mavlink
 
-from lapwing.cosim.log import LogWriter
 from lapwing.studies.flight_import.open_flight import open_flight
-from lapwing.studies.flight_import.write_log import write_log
 
 
 @pytest.fixture
@@ -230,95 +227,3 @@ def test_second_rangefinder_is_ignored(tlog):
                 yield mavlink.MAVLink_distance_sensor_message(ms, 10, 1000, distance, 0, number, orientation, 0)
 
     assert np.unique(tlog(change).readings["rangefinder"].values) == pytest.approx([3.0])
-
-
-def test_fast_csv_keeps_its_time_base(tmp_path):
-    from lapwing.studies.flight_import.column_mapping import load_mapping
-    from lapwing.studies.flight_import.csv_flight import from_columns
-
-    mapping = load_mapping("betaflight")
-    n = 3200
-    time = np.floor(312.5 * np.arange(n))
-    table = {column: np.zeros(n) for column in mapping.columns}
-    table |= {"time (us)": time, "accSmooth[2]": np.full(n, 2048.0), "vbatLatest (V)": np.full(n, 16.0)}
-    table |= {f"motor[{k}]": np.full(n, 500.0) for k in range(4)} | {"gyroADC[0]": np.sin(time * 1e-6)}
-    result = from_columns(tmp_path / "f.csv", table, mapping)
-    at = result.interval * np.arange(len(result))
-    assert at[-1] == pytest.approx(time[-1] * 1e-6, abs=1e-3)
-    assert result.omega[:, 0] == pytest.approx(np.radians(np.sin(at)), abs=1e-6)
-
-
-def write_bag(path, topics):
-    """Write a bag of messages (type, make(k, header)) by topic and number of messages per sample."""
-    from rosbags.rosbag2 import StoragePlugin, Writer
-    from rosbags.typesys import Stores, get_types_from_msg, get_typestore
-
-    types = get_typestore(Stores.ROS2_HUMBLE)
-    types.register(get_types_from_msg("std_msgs/Header header\nuint16[] channels\n", "mavros_msgs/msg/RCOut"))
-    text = "std_msgs/Header header\nfloat64[] position\nfloat64[] velocity\nfloat64[] normalized\n"
-    types.register(get_types_from_msg(text, "actuator_msgs/msg/Actuators"))
-    make = SimpleNamespace(**{name.rsplit("/", 1)[1]: kind for name, kind in types.types.items()})
-    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
-        for topic, (kind, count, content) in topics.items():
-            connection = writer.add_connection(topic, kind, typestore=types)
-            for k in range(count * SAMPLES):
-                ns = 1_700_000_000_000_000_000 + round(k * INTERVAL / count * 1e9)
-                header = make.Header(make.Time(ns // 10**9, ns % 10**9), "map")
-                writer.write(connection, ns, types.serialize_cdr(content(k, header, make), kind))
-
-
-def pose(height):
-    def content(k, header, make):
-        return make.PoseStamped(header, make.Pose(make.Point(0.0, 0.0, height), make.Quaternion(0.0, 0.0, 0.0, 1.0)))
-
-    return content
-
-
-def imu(k, header, make):
-    still, nine = make.Vector3(0.0, 0.0, 0.0), np.zeros(9)
-    return make.Imu(
-        header, make.Quaternion(0.0, 0.0, 0.0, 1.0), nine, still, nine, make.Vector3(0.0, 0.0, GRAVITY), nine
-    )
-
-
-def pulses(k, header, make):
-    return make.RCOut(header, np.array([1300 + 10 * n + k % 2 for n in range(6)] + [1500, 0], np.uint16))
-
-
-def no_shares(k, header, make):
-    return make.Actuators(header, np.zeros(0), np.full(4, 500.0), np.zeros(0))
-
-
-BAG = {
-    "/mavros/setpoint_position/local": ("geometry_msgs/msg/PoseStamped", 2, pose(9.0)),
-    "/mavros/local_position/pose": ("geometry_msgs/msg/PoseStamped", 1, pose(2.0)),
-    "/mavros/imu/data": ("sensor_msgs/msg/Imu", 1, imu),
-}
-
-
-def test_bag_of_mavros_hexacopter(tmp_path):
-    write_bag(tmp_path / "bag", {**BAG, "/mavros/rc/out": ("mavros_msgs/msg/RCOut", 1, pulses)})
-    result = open_flight(tmp_path / "bag")
-    assert result.position[:, 2] == pytest.approx(2.0)
-    assert "/mavros/setpoint_position/local" in result.unknown
-    assert result.rotors == 6
-    assert result.motor_voltage[0] == pytest.approx([0.30, 0.31, 0.32, 0.33, 0.34, 0.35], abs=1e-3)
-
-
-def test_bag_without_throttles_has_no_motor_outputs(tmp_path):
-    write_bag(tmp_path / "bag", {**BAG, "/motors": ("actuator_msgs/msg/Actuators", 1, no_shares)})
-    with pytest.raises(ValueError, match="no motor outputs"):
-        open_flight(tmp_path / "bag")
-
-
-def test_failed_import_keeps_former_log(tmp_path, flight, monkeypatch):
-    def interrupted(*_):
-        raise KeyboardInterrupt
-
-    out = tmp_path / "out.mcap"
-    out.write_bytes(b"former")
-    monkeypatch.setattr(LogWriter, "flush", interrupted)  # as the last messages are written
-    with pytest.raises(KeyboardInterrupt):
-        write_log(out, flight, "f.bin")
-    assert [path.name for path in tmp_path.iterdir()] == ["out.mcap"]
-    assert out.read_bytes() == b"former"

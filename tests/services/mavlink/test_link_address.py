@@ -1,0 +1,79 @@
+"""MAV_SYS_ID, MAV_COMP_ID and MAV_TYPE: settings of the link, of which the address changes at a reboot."""
+
+import math
+
+import pytest
+from adapter_harness import Bench
+from test_parameters import integer, read, set_whole
+
+from lapwing.services.common.mavlink.dialect import mavlink
+
+
+def present_address(station):
+    return {(m.get_srcSystem(), m.get_srcComponent()) for m in station.got}
+
+
+def test_address_changes_at_reboot():
+    bench = Bench()
+    station, other = bench.station(), bench.station(system=254)
+    set_whole(bench, station, "MAV_SYS_ID", 42)
+    set_whole(bench, station, "MAV_COMP_ID", 7)
+    bench.step(60)
+    assert integer(read(station, "MAV_SYS_ID")) == 42
+    assert present_address(station) == {(1, 1)}
+    assert station.command(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, 1.0) == mavlink.MAV_RESULT_ACCEPTED
+    bench.step(2)
+    for each in (station, other):
+        each.got.clear()
+    bench.step(120)
+    for each in (station, other):
+        assert present_address(each) == {(42, 7)}
+        assert each.last("HEARTBEAT")
+    assert bench.station().endpoint.send(mavlink.MAVLink_ping_message(0, 0, 0, 0)) is None
+    assert present_address(bench.stations[-1]) == {(42, 7)}  # also of a later connection
+    station.got.clear()
+    station.send("param_request_read", 1, 1, b"MAV_SYS_ID", -1)
+    assert station.got == []
+    station.send("param_request_read", 42, 7, b"MAV_SYS_ID", -1)
+    assert integer(station.last("PARAM_VALUE")) == 42
+
+
+@pytest.mark.parametrize(
+    ("action", "armed", "result"),
+    [
+        (0.0, True, mavlink.MAV_RESULT_ACCEPTED),  # nothing to do
+        (1.0, True, mavlink.MAV_RESULT_DENIED),
+        (2.0, False, mavlink.MAV_RESULT_DENIED),  # shutdown
+        (math.nan, False, mavlink.MAV_RESULT_DENIED),
+    ],
+)
+def test_reboot_only_while_disarmed(action, armed, result):
+    bench = Bench()
+    station = bench.station()
+    bench.vehicle.armed = armed
+    set_whole(bench, station, "MAV_SYS_ID", 42)
+    bench.step(2)
+    assert station.command(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, action) == result
+    station.got.clear()
+    bench.step(120)
+    assert present_address(station) == {(1, 1)}
+
+
+@pytest.mark.parametrize("value", [0, 251, -1, 2**31 - 1])
+@pytest.mark.parametrize("name", ["MAV_SYS_ID", "MAV_COMP_ID"])
+def test_address_out_of_range_is_rejected(name, value):
+    bench = Bench()
+    station = bench.station()
+    set_whole(bench, station, name, value)
+    assert station.last("PARAM_ERROR").error == mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
+    assert integer(station.last("PARAM_VALUE")) == 1
+
+
+def test_vehicle_type_is_shown_in_heartbeat():
+    bench = Bench()
+    station = bench.station()
+    set_whole(bench, station, "MAV_TYPE", mavlink.MAV_TYPE_OCTOROTOR)
+    bench.step(60)
+    assert station.last("HEARTBEAT").type == mavlink.MAV_TYPE_OCTOROTOR
+    set_whole(bench, station, "MAV_TYPE", mavlink.MAV_TYPE_FIXED_WING)
+    assert station.last("PARAM_ERROR").error == mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE
