@@ -17,6 +17,7 @@ import numpy as np
 from numba import njit
 
 from lapwing.kernels import math as functions
+from lapwing.kernels import vectorise_loops
 
 COUNT = 4096
 REPEATS = 200
@@ -33,13 +34,13 @@ _ENGINES: list[Any] = []  # owners of the code of the loops over SVML
 def _loop(function: Any, pairs: bool) -> Any:
     if pairs:
 
-        @njit(error_model="numpy")
+        @vectorise_loops
         def run(result, x, y):
             for i in range(x.size):
                 result[i] = function(x[i], y[i])
     else:
 
-        @njit(error_model="numpy")
+        @vectorise_loops
         def run(result, x):
             for i in range(x.size):
                 result[i] = function(x[i])

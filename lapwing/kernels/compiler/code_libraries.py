@@ -1,5 +1,6 @@
 """LLVM code of kernels and of the functions inside them, kept as bitcode: a tenth of the memory of LLVM modules."""
 
+import re
 from typing import Any
 
 from llvmlite import binding
@@ -75,7 +76,23 @@ class KernelLibrary(JITCodeLibrary):
         if self.no_refcount:
             noinline = [library._get_module_for_linking() for library in self._noinline.values()]
             self.no_refcount = not any(map(_allocates, (self._final_module, *noinline)))
+        if self.vectorise_loops and not isinstance(self, PureLibrary):
+            self._declare_variants()
         super().finalize()
+
+    def _declare_variants(self) -> None:
+        """Declare the variants for vectors of the functions that are called, so that loops are vectorised with them."""
+        lines, names = [], []
+        for library in self._noinline.values():
+            for function in library._get_module_for_linking().functions:
+                if PureLibrary.VARIANT.search(function.name):
+                    returns, _, arguments = str(function.global_value_type).rpartition(" (")
+                    lines.append(f'declare {returns} @"{function.name}"({arguments}')
+                    names.append(f'ptr @"{function.name}"')
+        if names:  # otherwise removed as unused before loops are vectorised
+            used = f"appending global [{len(names)} x ptr] [{', '.join(names)}]"
+            text = "\n".join((*lines, f'@llvm.compiler.used = {used}, section "llvm.metadata"'))
+            self._final_module.link_in(binding.parse_assembly(text))
 
     def _optimize_final_module(self) -> None:
         if self.no_refcount:
@@ -185,3 +202,20 @@ class InnerLibrary(KernelLibrary):
             libraries.append(library)
         libraries[0]._noinline = {library.noinline: library for library in libraries[1:]}
         return libraries[0]
+
+
+class PureLibrary(InnerLibrary):
+    """Code of a pure function of numbers and of its variants for vectors, whose loops are vectorised but not unrolled.
+
+    Attributes:
+        VARIANT: end of the names of variants.
+    """
+
+    vectorise_loops = True
+    VARIANT = re.compile(r"\.v\d+$")
+
+    def _optimize_final_module(self) -> None:
+        options = binding.create_pipeline_tuning_options(config.OPT)  # type: ignore[attr-defined]
+        options.loop_unrolling, options.loop_vectorization, options.slp_vectorization = False, True, False
+        builder = binding.create_pass_builder(self._codegen._tm, options)
+        _run(builder.getModulePassManager(), self._final_module, builder)

@@ -39,10 +39,10 @@ from lapwing.kernels.math import exponential, inverse_trigonometric, logarithm, 
 from lapwing.kernels.math._export import export
 from lapwing.kernels.math.sums import dist, hypot, total
 
-sin = export(trigonometric.sin)
-cos = export(trigonometric.cos)
-sincos = export(trigonometric.sincos)
-tan = export(trigonometric.tan)
+sin = export(trigonometric.sin, of_small=trigonometric.sin_of_small)
+cos = export(trigonometric.cos, of_small=trigonometric.cos_of_small)
+sincos = export(trigonometric.sincos, of_small=trigonometric.sincos_of_small)
+tan = export(trigonometric.tan, of_small=trigonometric.tan_of_small)
 asin = export(inverse_trigonometric.asin)
 acos = export(inverse_trigonometric.acos)
 atan = export(inverse_trigonometric.atan)

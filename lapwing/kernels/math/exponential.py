@@ -77,15 +77,15 @@ def exp(x):
 
 
 @always_inline
-def expm1_parts(x):
-    """Return exp(x) - 1 as two numbers, for -40 < x < 710."""
+def _half_expm1(x):
+    """Return (exp(x) - 1) / 2 as two numbers, for x of at most 710; of x < -40 it is wrong but finite."""
     k, r, r_low = _reduce(x)
-    scale = _two_to(k >> 6)  # 2**1023 at most
+    scale = _two_to((k >> 6) - 1)  # 2**1023 at most
     t1, t2 = _powers(2 * (k & 63)) * scale, _powers(2 * (k & 63) + 1) * scale
     r_all = r + r_low
     r1 = split(r_all)
     r2 = (r - r1) + r_low
-    base, base_low = two_sum(t1, -1.0)
+    base, base_low = two_sum(t1, -0.5)
     p = t1 * r1
     a, a_low = two_sum(base, p)
     q = t1 * (0.5 * r1 * r1)  # exact where exp(x) - 1 is small
@@ -100,29 +100,19 @@ def expm1_parts(x):
 @always_inline
 def expm1(x):
     """Return exp(x) - 1, precise for small x."""
-    if x != x or x == 0.0:
-        return x
-    if x < -40.0:
-        return -1.0
-    if x > 709.0:
-        first, rest, n = exp_parts(x, 0.0)
-        return scale_by_power_of_two(first + rest, n)
-    first, rest = expm1_parts(x)
-    return first + rest
+    clipped = select(x > 710.0, 710.0, select(x > -40.0, x, -40.0))
+    first, rest = _half_expm1(clipped)
+    result = select(x < -40.0, -1.0, 2.0 * (first + rest))
+    return select((abs(x) < 1e-17) | (x != x), x, result)
 
 
 @always_inline
 def tanh(x):
     """Return the hyperbolic tangent."""
-    if x != x or x == 0.0:
-        return x
-    size = abs(x)
-    if size > 22.0:
-        return with_sign(1.0, x)
-    if size < 1e-300:
-        return x
-    e, e_low = expm1_parts(2.0 * size)
+    size = select(abs(x) < 22.0, abs(x), 22.0)
+    e, e_low = _half_expm1(2.0 * size)
     e, e_low = quick_two_sum(e, e_low)
-    d, d_low = two_sum(e, 2.0)
+    d, d_low = two_sum(e, 1.0)
     first, rest = quotient(e, e_low, d, d_low + e_low)
-    return with_sign(first + rest, x)
+    result = select(size < 22.0, with_sign(first + rest, x), with_sign(1.0, x))
+    return select((abs(x) < 1e-300) | (x != x), x, result)

@@ -15,6 +15,7 @@ from lapwing.kernels.math._primitives import (
     is_negative,
     quick_two_sum,
     quotient,
+    select,
     split,
     table,
     two_sum,
@@ -76,8 +77,9 @@ def _direction(y, y_low, x, x_low, back, unscaled):
     steep = y > x
     n, n_low, d, d_low = (x, x_low, y, y_low) if steep else (y, y_low, x, x_low)
     t, t_low, first, rest = _angle(n, n_low, d, d_low, unscaled)
-    if unscaled < 1e-20:
-        t, t_low, first, rest = 0.0, 0.0, unscaled, 0.0
+    tiny = unscaled < 1e-20
+    t, t_low = select(tiny, 0.0, t), select(tiny, 0.0, t_low)
+    first, rest = select(tiny, unscaled, first), select(tiny, 0.0, rest)
     base = _QUARTER if steep else (_HALF if back else 0.0)
     base_low = _QUARTER_LOW if steep else (_HALF_LOW if back else 0.0)
     return _add_to_base(base, base_low, 1.0 if steep == back else -1.0, t, t_low, first, rest)
@@ -86,28 +88,27 @@ def _direction(y, y_low, x, x_low, back, unscaled):
 @always_inline
 def atan2(y, x):
     """Return the angle of the point (x, y) [rad] in [-pi, pi]; zeros and infinities as in C."""
-    if x != x or y != y:
-        return x + y
     a, b = abs(x), abs(y)
-    if a == math.inf or b == math.inf:
-        a, b = (1.0 if a == math.inf else 0.0), (1.0 if b == math.inf else 0.0)
-    if a == 0.0 and b == 0.0:
-        a = 1.0
+    unknown, infinite = (x != x) | (y != y), (a == math.inf) | (b == math.inf)
+    a = select(infinite, select(a == math.inf, 1.0, 0.0), a)
+    b = select(infinite, select(b == math.inf, 1.0, 0.0), b)
+    a = select(((a == 0.0) & (b == 0.0)) | unknown, 1.0, a)
+    b = select(unknown, 0.0, b)
     ratio = b / a if b <= a else a / b
     larger = a if b <= a else b
     scale = 2.0**-600 if larger > 2.0**400 else (2.0**600 if larger < 2.0**-400 else 1.0)
-    return with_sign(_direction(b * scale, 0.0, a * scale, 0.0, is_negative(x), ratio), y)
+    angle = with_sign(_direction(b * scale, 0.0, a * scale, 0.0, is_negative(x), ratio), y)
+    return select(unknown, x + y, angle)
 
 
 @always_inline
 def atan(x):
     """Return the arc tangent [rad]."""
-    size = abs(x)
-    if size > 1e20:
-        return with_sign(_QUARTER, x)
+    size = select(x == x, abs(x), 0.0)
+    size = select(size > 1e20, 1e20, size)  # beyond, the result is a quarter turn
     ratio = size if size <= 1.0 else 1.0 / size
     result = with_sign(_direction(size, 0.0, 1.0, 0.0, False, ratio), x)
-    return result if x == x else x
+    return select(x == x, result, x)
 
 
 @always_inline
@@ -124,20 +125,18 @@ def _other_leg(x):
 @always_inline
 def asin(x):
     """Return the arc sine [rad]; NaN beyond [-1, 1]."""
-    size = abs(x)
-    if not size <= 1.0:
-        return math.nan
+    known = abs(x) <= 1.0
+    size = select(known, abs(x), 0.0)
     leg, leg_low = _other_leg(size)
     ratio = size / leg if size <= leg else leg / size
-    return with_sign(_direction(size, 0.0, leg, leg_low, False, ratio), x)
+    return select(known, with_sign(_direction(size, 0.0, leg, leg_low, False, ratio), x), math.nan)
 
 
 @always_inline
 def acos(x):
     """Return the arc cosine [rad] in [0, pi]; NaN beyond [-1, 1]."""
-    size = abs(x)
-    if not size <= 1.0:
-        return math.nan
+    known = abs(x) <= 1.0
+    size = select(known, abs(x), 0.0)
     leg, leg_low = _other_leg(size)
     ratio = size / leg if size <= leg else leg / size
-    return _direction(leg, leg_low, size, 0.0, is_negative(x), ratio)
+    return select(known, _direction(leg, leg_low, size, 0.0, is_negative(x), ratio), math.nan)

@@ -71,13 +71,11 @@ def log(x):
 @always_inline
 def log1p(x):
     """Return log(1 + x), precise for small x; -inf for -1, NaN below."""
-    if not x > -1.0:
-        return -math.inf if x == -1.0 else math.nan
-    if x == math.inf or abs(x) < 1e-18:
-        return x
-    u, u_low = two_sum(1.0, x)
+    usual = (x > -1.0) & (x < math.inf)
+    u, u_low = two_sum(1.0, select(usual, x, 0.0))
     first, rest = _parts(u, u_low, True)
-    return first + rest
+    result = select(usual & (abs(x) >= 1e-18), first + rest, x)  # infinity and NaN are returned
+    return select(x > -1.0, result, select(x == -1.0, -math.inf, math.nan))
 
 
 @always_inline

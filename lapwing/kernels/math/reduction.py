@@ -37,6 +37,12 @@ def reduce_argument(x):
     """
     if abs(x) > LARGEST:
         return reduce_large_argument(x)
+    return reduce_small_argument(x)
+
+
+@always_inline
+def reduce_small_argument(x):
+    """Return k modulo 128, r and r_low as `reduce_argument` does, for |x| <= LARGEST, without a branch."""
     shifted = x * STEPS_PER_RADIAN + ROUNDER
     k = shifted - ROUNDER
     a, a_low = two_sum(x - k * _P1, -(k * _P2))

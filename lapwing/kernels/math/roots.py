@@ -45,7 +45,7 @@ def cbrt(x):
     small = size < 2.2250738585072014e-308
     i = bits(size * 18014398509481984.0 if small else size)
     exponent = (i >> 52) - (1077 if small else 1023)
-    third = (exponent + 3000) // 3 - 1000
+    third = ((exponent + 3000) * 21846 >> 16) - 1000  # a third of the exponent, rounded down
     m = from_bits((i & MANTISSA) | ((1023 + exponent - 3 * third) << 52))
     y = _Q0 + m * (_Q1 + m * (_Q2 + m * (_Q3 + m * (_Q4 + m * _Q5))))
     y = y - (y * y * y - m) / (3.0 * (y * y))

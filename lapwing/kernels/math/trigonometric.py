@@ -9,7 +9,7 @@ sum has about 65 correct bits before its one rounding.
 from lapwing.kernels.compiler.decorators import always_inline
 from lapwing.kernels.math._primitives import quotient, split, table
 from lapwing.kernels.math._tables import COSINE, SINE, SINES
-from lapwing.kernels.math.reduction import reduce_argument
+from lapwing.kernels.math.reduction import reduce_argument, reduce_small_argument
 
 _S3, _S5, _S7 = SINE
 _C4, _C6, _C8 = COSINE
@@ -17,9 +17,9 @@ _sines = table("sines", SINES)  # for each direction: upper and lower part of th
 
 
 @always_inline
-def _parts(x):
-    """Return sine and cosine as two numbers each, to be added."""
-    k, r, r_low = reduce_argument(x)
+def _parts(reduced):
+    """Return sine and cosine of a reduced angle as two numbers each, to be added."""
+    k, r, r_low = reduced
     at = 4 * k
     s1, s2, c1, c2 = _sines(at), _sines(at + 1), _sines(at + 2), _sines(at + 3)
     h1 = split(r)
@@ -38,31 +38,78 @@ def _parts(x):
 
 
 @always_inline
+def _sin(x, reduced):
+    s, s_low, _, _ = _parts(reduced)
+    return s + s_low if x != 0.0 else x
+
+
+@always_inline
+def _cos(reduced):
+    _, _, c, c_low = _parts(reduced)
+    return c + c_low
+
+
+@always_inline
+def _sincos(x, reduced):
+    s, s_low, c, c_low = _parts(reduced)
+    return (s + s_low if x != 0.0 else x), c + c_low
+
+
+@always_inline
+def _tan(x, reduced):
+    s, s_low, c, c_low = _parts(reduced)
+    a = s + s_low
+    b = c + c_low
+    first, rest = quotient(a, s_low - (a - s), b, c_low - (b - c))
+    return first + rest if x != 0.0 else x
+
+
+@always_inline
 def sin(x):
     """Return the sine of an angle [rad]."""
-    s, s_low, _, _ = _parts(x)
-    return s + s_low if x != 0.0 else x
+    return _sin(x, reduce_argument(x))
 
 
 @always_inline
 def cos(x):
     """Return the cosine of an angle [rad]."""
-    _, _, c, c_low = _parts(x)
-    return c + c_low
+    return _cos(reduce_argument(x))
 
 
 @always_inline
 def sincos(x):
     """Return sine and cosine of an angle [rad], bit-for-bit those of `sin` and `cos`."""
-    s, s_low, c, c_low = _parts(x)
-    return (s + s_low if x != 0.0 else x), c + c_low
+    return _sincos(x, reduce_argument(x))
 
 
 @always_inline
 def tan(x):
     """Return the tangent of an angle [rad]."""
-    s, s_low, c, c_low = _parts(x)
-    a = s + s_low
-    b = c + c_low
-    first, rest = quotient(a, s_low - (a - s), b, c_low - (b - c))
-    return first + rest if x != 0.0 else x
+    return _tan(x, reduce_argument(x))
+
+
+# The same for |x| <= LARGEST without a branch, so that loops over them are vectorised.
+
+
+@always_inline
+def sin_of_small(x):
+    """Return the sine of an angle [rad]."""
+    return _sin(x, reduce_small_argument(x))
+
+
+@always_inline
+def cos_of_small(x):
+    """Return the cosine of an angle [rad]."""
+    return _cos(reduce_small_argument(x))
+
+
+@always_inline
+def sincos_of_small(x):
+    """Return sine and cosine of an angle [rad]."""
+    return _sincos(x, reduce_small_argument(x))
+
+
+@always_inline
+def tan_of_small(x):
+    """Return the tangent of an angle [rad]."""
+    return _tan(x, reduce_small_argument(x))
