@@ -15,7 +15,7 @@ from lapwing.services.common.firmware.block import FirmwareBlock
 from lapwing.services.common.firmware.exchange_block import ExchangeBlock
 from lapwing.services.common.firmware.hold import COMMAND, HeldState, Hold
 from lapwing.services.common.firmware.hold_reference import HoldReference
-from lapwing.services.common.firmware.link import ExchangeLink, FirmwareLink
+from lapwing.services.common.firmware.link import Link
 from lapwing.services.common.firmware.playback import TOPICS, Playback, Recorded
 from lapwing.services.common.firmware.setup import FirmwareSetup
 from lapwing.services.common.setpoint_encoder import setpoint_encoder
@@ -24,7 +24,7 @@ from lapwing.services.common.setpoint_encoder import setpoint_encoder
 def firmware_service(
     setup: RunConfig,
     name: str,
-    create: Callable[[FirmwareSetup], FirmwareLink | ExchangeLink],
+    create: Callable[[FirmwareSetup], Link],
     recorded: Recorded | None = None,
 ) -> Service:
     """Return the service of an adapter.

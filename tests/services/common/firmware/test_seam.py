@@ -11,6 +11,7 @@ import pytest
 from lapwing.cosim.diagram.block_diagram import Service
 from lapwing.cosim.diagram.compiled_block import InputSample
 from lapwing.cosim.log import LogReader
+from lapwing.cosim.processes.patience import Patience
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.runs.resimulate import resimulate
 from lapwing.runs.single_process_run import fly_single
@@ -20,7 +21,6 @@ from lapwing.services.common.firmware import hold
 from lapwing.services.common.firmware.hold import FirmwareCommand, HeldState, Hold
 from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, LinkReport
 from lapwing.services.common.firmware.motor_order import Output, motor_order
-from lapwing.services.common.firmware.patience import Patience
 from lapwing.services.common.firmware.program import Program
 from lapwing.services.common.firmware.service import firmware_service
 from lapwing.services.common.ports import BatteryReading
