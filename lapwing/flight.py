@@ -11,10 +11,12 @@ from lapwing.cosim.config.provenance import attachments, failure, metadata
 from lapwing.cosim.diagram.topic_encoder import to_record_batches
 from lapwing.cosim.log import LogWriter
 from lapwing.cosim.log.log_sequencer import Recording
+from lapwing.cosim.output_lock import write_errors
 from lapwing.messages.topics import EVENTS
 from lapwing.runs.log_events import event_messages
-from lapwing.studies.flight_data import AXES, FlightData
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_topics import topic_of
+from lapwing.studies.flight_tracking import AXES
 from lapwing.studies.report import write
 from lapwing.studies.report.flight_phases import over
 from lapwing.studies.report.plot import Line, Panel, Plot, reference
@@ -47,10 +49,8 @@ class View:
 
     def save(self, path: str | Path) -> Path:
         """Write the page and return its path. Raise ValueError if it cannot be written."""
-        try:
+        with write_errors(path):
             Path(path).write_text(self.page, encoding="utf-8")
-        except OSError as fault:
-            raise ValueError(f"{path}: cannot be written: {fault.strerror or fault}") from None
         return Path(path)
 
     def _repr_html_(self) -> str:
@@ -78,10 +78,8 @@ class Flight(FlightData):
         """
         target = Path(path)
         if self.origin.recorded:
-            try:
+            with write_errors(target):
                 shutil.copyfile(self.origin.source, target)
-            except OSError as error:
-                raise ValueError(f"{target}: cannot be written: {error.strerror or error}") from None
             return target
         setup, messages = self.setup, []
         for name in self.topics:
@@ -154,8 +152,6 @@ class Flight(FlightData):
         with plot_style():
             plot_figure = figure(overview(self))
             if path is not None:
-                try:
+                with write_errors(path):
                     plot_figure.savefig(path)
-                except OSError as error:
-                    raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
         return plot_figure

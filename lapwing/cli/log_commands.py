@@ -9,6 +9,7 @@ from lapwing.cli.app import app
 from lapwing.cli.error_exit import DIFFERENT, fail
 from lapwing.cli.options import LogFile
 from lapwing.cli.output_paths import check_distinct, check_log, claim, claim_folder
+from lapwing.cosim.output_lock import write_errors
 
 if TYPE_CHECKING:
     from lapwing.studies.logs.log_comparison import Comparison
@@ -121,23 +122,19 @@ def export(
     for folder, write in ((parquet, tables.write_parquet), (csv, tables.write_csv), (mat, tables.write_mat)):
         if folder is None:
             continue
-        try:
+        with write_errors(folder):
             if folder is not mat:
                 folder.mkdir(exist_ok=True)
                 claim_folder(folder)
             for path in write(result, folder):
                 typer.echo(path)
-        except OSError as error:
-            raise ValueError(f"{folder}: cannot be written: {(error.strerror or str(error)).lower()}") from None
 
 
 def _about(info: "Info") -> dict[str, str]:
     """Return the header lines of `info` by label."""
+    from lapwing.studies.flight_provenance import solver_and_exchange
+
     metadata = info.metadata
-    solver = (
-        f"{metadata['solver_integrator']}, step {metadata['solver_step']} s" if "solver_integrator" in metadata else ""
-    )
-    exchange = f"{metadata['exchange_rate']} Hz, {metadata.get('coupling', '')}" if "exchange_rate" in metadata else ""
     count = sum(topic.messages for topic in info.topics)
     lines = {
         "scene": metadata.get("scene", ""),
@@ -145,8 +142,7 @@ def _about(info: "Info") -> dict[str, str]:
         "seed": metadata.get("seed", ""),
         "mode": metadata.get("mode", ""),
         "version": " ".join(filter(None, (metadata.get("version", ""), metadata.get("commit", "")))),
-        "solver": solver,
-        "exchange": exchange,
+        **solver_and_exchange(metadata),
         "duration": f"{info.end - info.start:g} s, from {info.start:g} to {info.end:g} s",
         "size": f"{info.size / 1e6:.2f} MB, {count} messages",
         "files": ", ".join(info.files),
