@@ -11,8 +11,7 @@ from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import check_distinct, check_log, claim, claim_named
 
 Flights = Annotated[
-    list[Path],
-    typer.Argument(metavar="FLIGHTS...", help="Lapwing logs (.mcap), or logs that `lapwing import` reads"),
+    list[Path], typer.Argument(metavar="FLIGHTS...", help="Lapwing logs (.mcap), or logs that `lapwing import` reads")
 ]
 MappingName = Annotated[
     str | None,

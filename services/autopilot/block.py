@@ -87,10 +87,7 @@ def start_step(p: Controller, s: Any, tick: int, inputs: tuple[InputSample, ...]
 
 @always_inline
 def block_outputs(
-    p: Controller,
-    i: StepStart,
-    landed_state: int,
-    c: control.Command,
+    p: Controller, i: StepStart, landed_state: int, c: control.Command
 ) -> tuple[motor_failure.State, tuple[MotorCommand, Setpoint, AutopilotStatus, Flight]]:
     """Return the new state of the motor failure detector and the outputs of the block.
 

@@ -71,10 +71,5 @@ def mode_name(custom_mode: int) -> str:
 
 
 CONVENTIONS = Conventions(
-    (AUTO, MISSION),
-    home_first=False,
-    open_value=math.nan,
-    bytewise=True,
-    mode_name=mode_name,
-    event_text=failsafe_text,
+    (AUTO, MISSION), home_first=False, open_value=math.nan, bytewise=True, mode_name=mode_name, event_text=failsafe_text
 )

@@ -50,11 +50,7 @@ class FirmwareBlock:
     """Python block that steps a link every `period` ticks."""
 
     def __init__(
-        self,
-        name: str,
-        setup: FirmwareSetup,
-        inputs: tuple[InputPort, ...],
-        create: Callable[[FirmwareSetup], Link],
+        self, name: str, setup: FirmwareSetup, inputs: tuple[InputPort, ...], create: Callable[[FirmwareSetup], Link]
     ):
         """Create the block; `create` is the class of the link."""
         self.name, self.inputs = f"{name}.link", inputs

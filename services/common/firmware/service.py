@@ -21,10 +21,7 @@ from lapwing.services.common.firmware.setup import FirmwareSetup
 
 
 def firmware_service(
-    setup: RunConfig,
-    name: str,
-    create: Callable[[FirmwareSetup], Link],
-    recorded: Recorded | None = None,
+    setup: RunConfig, name: str, create: Callable[[FirmwareSetup], Link], recorded: Recorded | None = None
 ) -> Service:
     """Return the service of an adapter.
 
