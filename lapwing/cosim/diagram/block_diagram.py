@@ -47,6 +47,20 @@ class Service:
         return [*(wire.topic for wire in self.wires), *self.python_topics]
 
 
+class ExternalBlock:
+    """Block whose outputs are written from outside of the diagram."""
+
+    def __init__(self, name: str, *outputs: Port):
+        self.name, self.outputs = name, outputs
+
+    def bind(self, graph: "BlockDiagram") -> None:
+        """Do nothing."""
+
+    def on_tick(self, tick: int) -> int:
+        """Return NEVER: the outputs are written from outside."""
+        return NEVER
+
+
 class BlockDiagram:
     """Block diagram of one or more services.
 
