@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from lapwing.studies.campaign.folder import Folder
     from lapwing.studies.campaign.plan import Plan
     from lapwing.studies.campaign.runs import Reference
-    from lapwing.studies.campaign.shard_loop import Workers
+    from lapwing.studies.workers import Workers
 
 LINES = 5.0  # [s] between progress lines without a terminal
 

@@ -116,13 +116,13 @@ def reserve_log(scene: str) -> Path:
 def remove_on_failure(log: Path) -> Iterator[None]:
     """Remove a log that was missing or empty before, if the run fails before its first message."""
     is_new = not log.exists() or log.stat().st_size == 0
-    try:
-        with write_errors(log):
+    with write_errors(log):
+        try:
             yield
-    except ValueError:
-        if is_new and not is_locked(log) and not _has_messages(log):
-            log.unlink(missing_ok=True)
-        raise
+        except ValueError:
+            if is_new and not is_locked(log) and not _has_messages(log):
+                log.unlink(missing_ok=True)
+            raise
 
 
 def modification_time(path: Path) -> int | None:

@@ -105,14 +105,14 @@ def _accuracy_of_log(log: Path, accuracy: bool, overrides: list[str], allow_code
     if not accuracy:
         raise ValueError(f"{log}: is a log; give --accuracy to measure its solver, or use lapwing info")
     values = with_values({}, overrides)
-    asked = values.get("solver", {}).get("accuracy")
-    if values not in ({}, {"solver": {"accuracy": asked}}):
+    limit = values.get("solver", {}).get("accuracy")
+    if values not in ({}, {"solver": {"accuracy": limit}}):
         raise ValueError("--set: the solver of a log is the recorded one; only solver.accuracy can be set")
-    if asked is not None and not (isinstance(asked, int | float) and asked > 0.0):
-        raise ValueError(f"--set solver.accuracy: expected a number above 0, got {asked!r}")
+    if limit is not None and not (isinstance(limit, int | float) and limit > 0.0):
+        raise ValueError(f"--set solver.accuracy: expected a number above 0, got {limit!r}")
     run = recorded_run(log, allow_code)
-    flown = {"operator": run.operators, "recorded": run.firmware}
-    return flight_accuracy.measure_recorded(run.setup._replace(last_tick=run.last), flown, _with_bar, asked)
+    inputs = {"operator": run.operators, "recorded": run.firmware}
+    return flight_accuracy.measure_recorded(run.setup._replace(last_tick=run.last), inputs, _with_bar, limit)
 
 
 def _accuracy_met(result: "FlightAccuracy", json: Path | None) -> bool:

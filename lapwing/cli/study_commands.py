@@ -185,7 +185,7 @@ def tune(
     claim_named("--out", out, ".toml")
     claim_named("--report", report, ".html")
     target, screen = Bandwidths(altitude, yaw, attitude, position), console()
-    loaded, flown = load(scene, set_ or []), count(1)
+    loaded, numbers = load(scene, set_ or []), count(1)
     with step_progress(screen, "gain sets at most") as progress:
 
         def show(text: str, done: int = 0) -> None:
@@ -198,7 +198,7 @@ def tune(
                 target,
                 lambda text: screen.print(text, soft_wrap=True),
                 log,
-                lambda: show("flying gain sets", next(flown)),
+                lambda: show("flying gain sets", next(numbers)),
             )
     console_output.show(screen, result)
     if out and (force or not result.failures):

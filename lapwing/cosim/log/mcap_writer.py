@@ -142,11 +142,11 @@ class Container:
         offset = end = self._offset
         length = len(records[0])
         index_offsets: dict[int, int] = {}
-        for index_record in messages.indexes:
+        for entry in messages.indexes:
             end += len(records[-1])
-            index_offsets[index_record.channel_id] = end
-            records.append(index_record.record(len(head)))
-        record = b"".join(records)
+            index_offsets[entry.channel_id] = end
+            records.append(entry.record(len(head)))
+        data = b"".join(records)
         index = ChunkIndex(
             chunk_start_offset=offset,
             chunk_length=length,
@@ -156,21 +156,19 @@ class Container:
             message_start_time=messages.start_ns,
             message_end_time=messages.end_ns,
             message_index_offsets=index_offsets,
-            message_index_length=len(record) - length,
+            message_index_length=len(data) - length,
         )
         before = self._chunks.extent
         self._chunks.add(encode(index), messages.start_ns, messages.end_ns)
         try:
-            self._write(record)
+            self._write(data)
         except OSError:
             self._chunks.extent = before
             raise
-        self._schemas += [index_record for index_record in declarations if isinstance(index_record, Schema)]
-        self._channels += [index_record for index_record in declarations if isinstance(index_record, Channel)]
-        for index_record in messages.indexes:
-            self._counts[index_record.channel_id] = self._counts.get(index_record.channel_id, 0) + len(
-                index_record.times_ns
-            )
+        self._schemas += [record for record in declarations if isinstance(record, Schema)]
+        self._channels += [record for record in declarations if isinstance(record, Channel)]
+        for entry in messages.indexes:
+            self._counts[entry.channel_id] = self._counts.get(entry.channel_id, 0) + len(entry.times_ns)
         self._cut()
 
     def finish(self) -> None:
