@@ -20,7 +20,7 @@ from lapwing.services.ardupilot.simulated_sensors import SimulatedSensors
 from lapwing.services.common import ports
 from lapwing.services.common.firmware.datagrams import DatagramSocket, bound_socket
 from lapwing.services.common.firmware.exchange import INVALID, LAST_START, POLL, SEND, Shared, empty_ring
-from lapwing.services.common.firmware.flight_status import FlightStatus
+from lapwing.services.common.firmware.flight_status import poll_flight
 from lapwing.services.common.firmware.link import FirmwareOutput, LinkReport, Read, Waits
 from lapwing.services.common.firmware.mavlink_transport import TcpTransport
 from lapwing.services.common.firmware.mission import mission_items, mission_messages
@@ -48,7 +48,6 @@ class ArduPilotLink(ProgramLink):
         self.report = LinkReport("ardupilot")
         self._sequence, self._socket = FrameSequence(), DatagramSocket()
         self._client: MissionClient | None = None
-        self._status: FlightStatus | None = None
         self._simulated: SimulatedSensors | None = None
         self._packet: ServoPacket | None = None
         self._was_resent = False  # a frame was resent since the last answer
@@ -90,7 +89,6 @@ class ArduPilotLink(ProgramLink):
         self._client = MissionClient(
             TcpTransport(setup.host, port), CONVENTIONS, mission_messages(items, self._own.datum), parameters
         )
-        self._status = FlightStatus("ardupilot", self._client)
         self._simulated = SimulatedSensors(self._own, self._client)
         patience = self._patience(setup.start_timeout)
         while self._packet is None:
@@ -129,13 +127,12 @@ class ArduPilotLink(ProgramLink):
     def _poll(self, tick: int, read: Read) -> FirmwareOutput:
         """Poll the MAVLink link. Return the state of the flight."""
         assert self._client is not None
-        assert self._status is not None
         assert self._simulated is not None
-        self._status.poll(self._time)
-        self.report.version = self._status.version
+        result = poll_flight(NAME, self._client, self._time)
+        self.report.version = self._client.version
         self._simulated.update(self._time, read, tuple(self._shared.outputs))
         self._shared.next_poll[0] = max(tick + 1, math.floor(self._client.next_poll / self._setup.interval))
-        return self._status.output((), running=False)
+        return result
 
     def _await(self, size: int, waits: Waits) -> None:
         """Wait for the next servo packet, after compiled code received `size` bytes that were not this packet.
