@@ -146,7 +146,7 @@ class Container:
             end += len(records[-1])
             index_offsets[entry.channel_id] = end
             records.append(entry.record(len(head)))
-        data = b"".join(records)
+        record = b"".join(records)
         index = ChunkIndex(
             chunk_start_offset=offset,
             chunk_length=length,
@@ -156,12 +156,12 @@ class Container:
             message_start_time=messages.start_ns,
             message_end_time=messages.end_ns,
             message_index_offsets=index_offsets,
-            message_index_length=len(data) - length,
+            message_index_length=len(record) - length,
         )
         before = self._chunks.extent
         self._chunks.add(encode(index), messages.start_ns, messages.end_ns)
         try:
-            self._write(data)
+            self._write(record)
         except OSError:
             self._chunks.extent = before
             raise
