@@ -23,7 +23,8 @@ from lapwing.cosim.diagram.block_diagram import Service
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.executors.lockstep import pin, run_lockstep
 from lapwing.cosim.executors.participant import Participant
-from lapwing.cosim.transport.bus import ZenohBus, mesh
+from lapwing.cosim.transport.bus import ZenohBus
+from lapwing.cosim.transport.session_settings import mesh
 from lapwing.kernels.row_packing import pack_row
 from lapwing.services.common import ports
 from lapwing.services.common.ports import MotorCommand, Setpoint, TrueState

@@ -24,9 +24,10 @@ from lapwing.cosim.executors.log_backpressure import LogBackpressure
 from lapwing.cosim.executors.participant import Participant
 from lapwing.cosim.log import LogReader
 from lapwing.cosim.log.mcap_writer import Container
-from lapwing.cosim.transport.bus import ZenohBus, mesh
+from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import BATCH_KEY
 from lapwing.cosim.transport.packets import pack_log_packet
+from lapwing.cosim.transport.session_settings import mesh
 from lapwing.messages import Imu, Odometry, PoseStamped, VehicleState, header
 from lapwing.messages.cdr_arrays import Record, stamp_columns
 from lapwing.messages.topics import IMU, ODOM, POSE, TRUTH

@@ -1,5 +1,6 @@
 """Flight with its exports: log, report, 3D view and plot."""
 
+import html
 import shutil
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -7,22 +8,57 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from lapwing.cosim.config.provenance import attachments, failure, metadata
-from lapwing.cosim.diagram.block_diagram import to_record_batches
+from lapwing.cosim.diagram.topic_encoder import to_record_batches
 from lapwing.cosim.log import LogWriter
 from lapwing.cosim.log.log_sequencer import Recording
+from lapwing.cosim.output_lock import write_errors
 from lapwing.messages.topics import EVENTS
 from lapwing.runs.log_events import event_messages
-from lapwing.studies import flight_data as studied
+from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_topics import topic_of
+from lapwing.studies.flight_tracking import AXES
 from lapwing.studies.report import write
-from lapwing.studies.report.overview import overview
-from lapwing.studies.view3d.view import View
+from lapwing.studies.report.flight_phases import over
+from lapwing.studies.report.plot import Line, Panel, Plot, reference
+from lapwing.studies.report.plots.path import space
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
-class Flight(studied.FlightData):
+def overview(flight: FlightData) -> Plot:
+    """Plot the position with its setpoint, and the path."""
+    t, desired = flight.truth.times, flight.reference
+    panels = []
+    for row, name in enumerate(AXES[:3]):
+        marks = (
+            Line(t, flight.truth.position[:, row], "flown", width=2.0),
+            reference(t[: len(desired)], desired[:, row]),
+        )
+        panels.append(Panel(marks, f"{name} [m]", row=row))
+    panels.append(space(flight)._replace(column=1, rows=3))
+    return Plot(tuple(panels), "", 4.6, (1.0,) * 3, (1.35, 1.0), **over(flight))
+
+
+class View:
+    """Page with the 3D view of one or more flights, which works offline."""
+
+    def __init__(self, page: str, height: int):
+        """Create from the HTML text of the page and the height in a notebook [pixel]."""
+        self.page, self._height = page, height
+
+    def save(self, path: str | Path) -> Path:
+        """Write the page and return its path. Raise ValueError if it cannot be written."""
+        with write_errors(path):
+            Path(path).write_text(self.page, encoding="utf-8")
+        return Path(path)
+
+    def _repr_html_(self) -> str:
+        style = f"width:100%;height:{self._height}px;border:0"
+        return f'<iframe title="3D view" style="{style}" srcdoc="{html.escape(self.page, quote=True)}"></iframe>'
+
+
+class Flight(FlightData):
     """Recorded flight: its topics, and the outcome and metrics computed from them.
 
     `flight.truth.position` is an array by time, shape (n, 3) [m] in the world frame, `flight.truth.times` its times
@@ -42,10 +78,8 @@ class Flight(studied.FlightData):
         """
         target = Path(path)
         if self.origin.recorded:
-            try:
+            with write_errors(target):
                 shutil.copyfile(self.origin.source, target)
-            except OSError as error:
-                raise ValueError(f"{target}: cannot be written: {error.strerror or error}") from None
             return target
         setup, messages = self.setup, []
         for name in self.topics:
@@ -63,7 +97,7 @@ class Flight(studied.FlightData):
         return target
 
     def report(
-        self, path: str | Path | None = None, compare_with: studied.FlightData | None = None, view3d: bool = True
+        self, path: str | Path | None = None, compare_with: FlightData | None = None, view3d: bool = True
     ) -> Path:
         """Write the report: a page for a browser (.html), or its plots (.pdf, .png).
 
@@ -82,7 +116,7 @@ class Flight(studied.FlightData):
         flights = [self] if compare_with is None else [self, compare_with]
         return write(flights, Path(path) if path else source.with_suffix(".html"), view3d)
 
-    def view(self, compare_with: studied.FlightData | None = None, height: int = 480) -> View:
+    def view(self, compare_with: FlightData | None = None, height: int = 480) -> View:
         """Return the 3D view of the flight; a notebook shows it, `save` writes it to a page.
 
         Args:
@@ -118,8 +152,6 @@ class Flight(studied.FlightData):
         with plot_style():
             plot_figure = figure(overview(self))
             if path is not None:
-                try:
+                with write_errors(path):
                     plot_figure.savefig(path)
-                except OSError as error:
-                    raise ValueError(f"{path}: cannot be written: {error.strerror or error}") from None
         return plot_figure

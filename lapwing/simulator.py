@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lapwing.cosim.config.run_config import RunConfig
-from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram, Service
+from lapwing.cosim.diagram.block_diagram import BlockDiagram, ExternalBlock, Service
 from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
 from lapwing.cosim.scene import KeyOrigin, Overrides, Scene, SceneError
 from lapwing.kernels.row_packing import pack_row, row_width
@@ -33,22 +33,6 @@ class Observation(NamedTuple):
     sensors: dict[str, Any]  # newest reading of each sensor by name
     estimate: StateEstimate | None  # estimate of the autopilot; None with motor voltages
     done: bool  # True at the end of the run, or if the state is invalid
-
-
-class UserCommandBlock:
-    """Block that replaces the autopilot or its commander and outputs the user's command."""
-
-    name = "simulator.given"
-
-    def __init__(self, *outputs: Port):
-        self.outputs = outputs
-
-    def bind(self, graph: BlockDiagram) -> None:
-        """Do nothing."""
-
-    def on_tick(self, tick: int) -> int:
-        """Do nothing: the simulator writes the values."""
-        return NEVER
 
 
 def _validate_setpoint(setpoint: Setpoint) -> Setpoint:
@@ -170,15 +154,15 @@ class Simulator:
         services = [create(setup, name) for name in names]
         if kind == "motor_voltages":
             outputs = [setup.port(ports.ACTUATORS), setup.port(ports.STATUS)]
-            services.append(Service("simulator", [UserCommandBlock(*outputs)], []))
+            services.append(Service("simulator", [ExternalBlock("simulator.given", *outputs)], []))
             return BlockDiagram(setup, services, KEEP)
         autopilot = create(setup, "autopilot")
-        command_block = UserCommandBlock(
-            Port(ORDER, ControllerInput(), LATCHED), Port(NO_TRAJECTORY, Setpoint(), LATCHED)
+        command_block = ExternalBlock(
+            "simulator.given", Port(ORDER, ControllerInput(), LATCHED), Port(NO_TRAJECTORY, Setpoint(), LATCHED)
         )
         autopilot.parts = [command_block if part.name == "autopilot.commander" else part for part in autopilot.parts]
         if ports.TRAJECTORY in setup.ports:
-            services.append(Service("trajectory", [UserCommandBlock(setup.port(ports.TRAJECTORY))], []))
+            services.append(Service("trajectory", [ExternalBlock("simulator.given", setup.port(ports.TRAJECTORY))], []))
         return BlockDiagram(setup, [*services, autopilot], KEEP)
 
     def _voltages(self, values: Sequence[float]) -> tuple[float, ...]:

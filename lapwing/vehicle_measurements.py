@@ -86,10 +86,7 @@ FIGURES = (
     ),
     Figure("stand_thrust", "N", lambda v: _thrust(v), "Thrust on the stand at that speed."),
     Figure(
-        "stand_torque",
-        "N m",
-        lambda v: 0.072 * v["stand_thrust"] * v["diameter"],
-        "Torque on the stand at that speed.",
+        "stand_torque", "N m", lambda v: 0.072 * v["stand_thrust"] * v["diameter"], "Torque on the stand at that speed."
     ),
     Figure(
         "rotor_inertia",

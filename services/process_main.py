@@ -84,8 +84,8 @@ def run_participant(spec: ProcessSpec) -> ExitCode:
     from lapwing.cosim.access.publisher_ids import PublisherIds
     from lapwing.cosim.executors.lockstep import run_encoder, run_lockstep
     from lapwing.cosim.executors.participant import Participant, Stopped
-    from lapwing.cosim.transport.bus import ZenohBus, mesh
-    from lapwing.cosim.transport.session_settings import CHILD_LINKS
+    from lapwing.cosim.transport.bus import ZenohBus
+    from lapwing.cosim.transport.session_settings import CHILD_LINKS, mesh
     from lapwing.services import process_table
     from lapwing.services.security import door_settings, settings
 

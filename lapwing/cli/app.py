@@ -5,6 +5,8 @@ from typing import Any
 import typer
 from typer.core import TyperGroup
 
+from lapwing.cli.error_exit import user_errors
+
 GROUPS = {  # headings and commands in the order of a workflow
     "Fly": ("scenes", "check", "run", "service", "autopilot"),
     "Inspect": ("studio", "report", "view", "render", "parameters"),
@@ -16,7 +18,12 @@ GROUPS = {  # headings and commands in the order of a workflow
 
 
 class GroupedCommands(TyperGroup):
-    """Group that lists its commands under the headings of `GROUPS`, others last."""
+    """Group that lists its commands under the headings of `GROUPS`, others last, and reports their errors."""
+
+    def invoke(self, ctx: Any) -> Any:
+        """Run a command; print errors as one line."""
+        with user_errors():
+            return super().invoke(ctx)
 
     def format_commands(self, ctx: Any, formatter: Any) -> None:
         """Write each command with the whole first line of its help."""

@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 
 from lapwing.cli.app import app
-from lapwing.cli.error_exit import user_errors
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import check_log, remove_on_failure, reserve_log
 
@@ -31,22 +30,21 @@ def autopilot(
     from lapwing.services.scene_resolver import load, resolve
     from lapwing.studies.terminal import console
 
-    with user_errors():
-        host, port = _address(px4_sim)
-        loaded = load(scene, set_ or [])
-        with loaded.located():
-            setup = on_simulator(loaded, resolve(loaded), host, port)
-        path = log or reserve_log(loaded.name)
-        check_log(path)
-        sources = {name: content.decode() for name, content in loaded.sources.items()}
-        with remove_on_failure(path), RunProgress(console(), setup.duration) as display:
-            elapsed = fly_single(setup, path, sources, observer=display, services=services(setup))
-        typer.echo(f"{elapsed.simulated:.1f} s flown in {elapsed.wall:.1f} s")
-        with LogReader(path) as read:
-            for key in ("firmware", "firmware_notes"):
-                if text := read.metadata.get(key):
-                    typer.echo(text)
-        typer.echo(f"log     {path}")
+    host, port = _address(px4_sim)
+    loaded = load(scene, set_ or [])
+    with loaded.located():
+        setup = on_simulator(loaded, resolve(loaded), host, port)
+    path = log or reserve_log(loaded.name)
+    check_log(path)
+    sources = {name: content.decode() for name, content in loaded.sources.items()}
+    with remove_on_failure(path), RunProgress(console(), setup.duration) as display:
+        elapsed = fly_single(setup, path, sources, observer=display, services=services(setup))
+    typer.echo(f"{elapsed.simulated:.1f} s flown in {elapsed.wall:.1f} s")
+    with LogReader(path) as read:
+        for key in ("firmware", "firmware_notes"):
+            if text := read.metadata.get(key):
+                typer.echo(text)
+    typer.echo(f"log     {path}")
 
 
 def _address(text: str) -> tuple[str, int]:

@@ -6,7 +6,6 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from lapwing.cli.app import app
-from lapwing.cli.error_exit import user_errors
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import check_distinct, claim, claim_folder, claim_report
 from lapwing.cli.preflight import check_firmware_program, with_solver_selected
@@ -17,7 +16,7 @@ if TYPE_CHECKING:
     from lapwing.studies.campaign.folder import Folder
     from lapwing.studies.campaign.plan import Plan
     from lapwing.studies.campaign.runs import Reference
-    from lapwing.studies.campaign.shard_loop import Workers
+    from lapwing.studies.workers import Workers
 
 LINES = 5.0  # [s] between progress lines without a terminal
 
@@ -79,7 +78,7 @@ def campaign(
     from lapwing.studies.terminal import console
     from lapwing.studies.workers import cores
 
-    with user_errors(), foreign_code.permission(allow_code):
+    with foreign_code.permission(allow_code):
         if workers is not None and workers < 1:
             raise ValueError(f"--workers {workers}: expected at least 1")
         if ci_half_width is not None and not 0.0 < ci_half_width < 1.0:
@@ -139,12 +138,11 @@ def compare(
     from lapwing.studies.json_file import write_json
     from lapwing.studies.terminal import console
 
-    with user_errors():
-        claim(json)
-        result = study.compare(one, other)
-        study.show(console(), result)
-        if json:
-            write_json(json, result)
+    claim(json)
+    result = study.compare(one, other)
+    study.show(console(), result)
+    if json:
+        write_json(json, result)
 
 
 def _reference(screen: "Console", campaign_plan: "Plan") -> "Reference":

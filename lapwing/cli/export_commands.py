@@ -6,7 +6,6 @@ from typing import Annotated
 import typer
 
 from lapwing.cli.app import app
-from lapwing.cli.error_exit import user_errors
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import claim, claim_folder
 from lapwing.cli.preflight import with_solver_selected
@@ -40,7 +39,7 @@ def export_library(
     """
     from lapwing.services.common import foreign_code
 
-    with user_errors(), foreign_code.permission(allow_code):
+    with foreign_code.permission(allow_code):
         _check(part, cpu)
         from lapwing.fmi.library import export_library, library_name
         from lapwing.services.scene_resolver import resolve
@@ -72,7 +71,7 @@ def export_fmu(
     """
     from lapwing.services.common import foreign_code
 
-    with user_errors(), foreign_code.permission(allow_code):
+    with foreign_code.permission(allow_code):
         _check(part, cpu)
         _check_fmi(fmi)
         if out.suffix != ".fmu":
@@ -102,7 +101,7 @@ def export_ssp(
     """
     from lapwing.services.common import foreign_code
 
-    with user_errors(), foreign_code.permission(allow_code):
+    with foreign_code.permission(allow_code):
         _check("vehicle", cpu)
         _check_fmi(fmi)
         if out.suffix != ".ssp":

@@ -7,13 +7,11 @@ from typing import Annotated
 import typer
 
 from lapwing.cli.app import app
-from lapwing.cli.error_exit import user_errors
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import check_distinct, check_log, claim, claim_named
 
 Flights = Annotated[
-    list[Path],
-    typer.Argument(metavar="FLIGHTS...", help="Lapwing logs (.mcap), or logs that `lapwing import` reads"),
+    list[Path], typer.Argument(metavar="FLIGHTS...", help="Lapwing logs (.mcap), or logs that `lapwing import` reads")
 ]
 MappingName = Annotated[
     str | None,
@@ -48,21 +46,20 @@ def validate(
     from lapwing.studies.validation import console_output, procedure, report_page
     from lapwing.studies.validation.start_states import TrimMemory
 
-    with user_errors():
-        steps = _horizons(horizons)
-        _check_flights(flights)
-        check_distinct({"--json": json, "--report": report})
-        claim(json)
-        claim_named("--report", report, ".html")
-        with step_progress(console(), "steps") as say:
-            memory = TrimMemory(trim_force, trim_torque)
-            result = procedure.validate(scene, flights, mapping, steps, set_ or [], memory, stride, closed_loop, say)
-        console_output.show(console(), result)
-        if json:
-            procedure.write_json(json, result)
-        if report:
-            report_page.write(report, result)
-            typer.echo(f"{report}: errors over the envelope and residual spectra")
+    steps = _horizons(horizons)
+    _check_flights(flights)
+    check_distinct({"--json": json, "--report": report})
+    claim(json)
+    claim_named("--report", report, ".html")
+    with step_progress(console(), "steps") as say:
+        memory = TrimMemory(trim_force, trim_torque)
+        result = procedure.validate(scene, flights, mapping, steps, set_ or [], memory, stride, closed_loop, say)
+    console_output.show(console(), result)
+    if json:
+        procedure.write_json(json, result)
+    if report:
+        report_page.write(report, result)
+        typer.echo(f"{report}: errors over the envelope and residual spectra")
 
 
 @app.command()
@@ -94,32 +91,31 @@ def identify(
     from lapwing.studies.terminal import console
     from lapwing.studies.validation.start_states import TrimMemory
 
-    with user_errors():
-        _check_flights(flights)
-        if out.suffix != ".toml":
-            raise ValueError(f"--out {out}: expected a name that ends in .toml")
-        if sensors:
-            if free or json:
-                raise ValueError("--sensors: estimates all sensors; leave out --free and --json")
-            _fit_sensors(flights, mapping, out)
-            return
-        keys = [key.strip() for key in free.split(",") if key.strip()]
-        if not keys or len(set(keys)) < len(keys):
-            raise ValueError(f"--free {free}: expected different keys with commas between them, or --sensors")
-        steps = _horizons(horizons)
-        check_distinct({"--out": out, "--json": json})
-        claim(out)
-        claim(json)
-        memory, progress = TrimMemory(trim_force, trim_torque), out.with_name(f"{out.name}.progress")
-        with step_progress(console(), "steps") as say:
-            result = procedure.identify(
-                scene, flights, mapping, keys, memory, set_ or [], windows, seed, progress, say, horizons=steps
-            )
-        console_output.show(console(), result)
-        procedure.write_airframe(out, scene, result, set_ or [])
-        typer.echo(f"{out}: the airframe; its first lines hold what belongs to the scene")
-        if json:
-            console_output.write_json(json, result)
+    _check_flights(flights)
+    if out.suffix != ".toml":
+        raise ValueError(f"--out {out}: expected a name that ends in .toml")
+    if sensors:
+        if free or json:
+            raise ValueError("--sensors: estimates all sensors; leave out --free and --json")
+        _fit_sensors(flights, mapping, out)
+        return
+    keys = [key.strip() for key in free.split(",") if key.strip()]
+    if not keys or len(set(keys)) < len(keys):
+        raise ValueError(f"--free {free}: expected different keys with commas between them, or --sensors")
+    steps = _horizons(horizons)
+    check_distinct({"--out": out, "--json": json})
+    claim(out)
+    claim(json)
+    memory, progress = TrimMemory(trim_force, trim_torque), out.with_name(f"{out.name}.progress")
+    with step_progress(console(), "steps") as say:
+        result = procedure.identify(
+            scene, flights, mapping, keys, memory, set_ or [], windows, seed, progress, say, horizons=steps
+        )
+    console_output.show(console(), result)
+    procedure.write_airframe(out, scene, result, set_ or [])
+    typer.echo(f"{out}: the airframe; its first lines hold what belongs to the scene")
+    if json:
+        console_output.write_json(json, result)
 
 
 def _fit_sensors(flights: list[Path], mapping: str | None, out: Path) -> None:
@@ -153,27 +149,24 @@ def import_(
     from lapwing.studies.flight_import.open_flight import open_flight
     from lapwing.studies.flight_import.write_log import write_log
 
-    with user_errors():
-        check_distinct({"FLIGHT": flight, "--out": out})
-        if out.suffix != ".mcap":
-            raise ValueError(f"--out {out}: expected a name that ends in .mcap")
-        if flight.suffix == ".mcap":
-            raise ValueError(f"{flight}: is a log already; for a file of a rosbag2, use its folder with metadata.yaml")
-        recording = open_flight(flight, mapping)
-        if not recording.valid.any():
-            raise ValueError(f"{flight}: no valid sample; check the --mapping")
-        check_log(out)
-        claim(out)
-        write_log(out.resolve(), recording, flight.name)
-        typer.echo(
-            f"{out}: {len(recording) * recording.interval:.1f} s, {int((~recording.valid).sum())} samples left out"
-        )
-        for cause, count in recording.faults.items():
-            typer.echo(f"marked samples: {cause}: {count}")
-        for note in recording.notes:
-            typer.echo(note)
-        if recording.unknown:
-            typer.echo(f"topics without a counterpart: {', '.join(recording.unknown)}")
+    check_distinct({"FLIGHT": flight, "--out": out})
+    if out.suffix != ".mcap":
+        raise ValueError(f"--out {out}: expected a name that ends in .mcap")
+    if flight.suffix == ".mcap":
+        raise ValueError(f"{flight}: is a log already; for a file of a rosbag2, use its folder with metadata.yaml")
+    recording = open_flight(flight, mapping)
+    if not recording.valid.any():
+        raise ValueError(f"{flight}: no valid sample; check the --mapping")
+    check_log(out)
+    claim(out)
+    write_log(out.resolve(), recording, flight.name)
+    typer.echo(f"{out}: {len(recording) * recording.interval:.1f} s, {int((~recording.valid).sum())} samples left out")
+    for cause, count in recording.faults.items():
+        typer.echo(f"marked samples: {cause}: {count}")
+    for note in recording.notes:
+        typer.echo(note)
+    if recording.unknown:
+        typer.echo(f"topics without a counterpart: {', '.join(recording.unknown)}")
 
 
 def _horizons(text: str) -> tuple[int, ...]:

@@ -6,9 +6,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from lapwing.cli.app import app
-from lapwing.cli.error_exit import DIFFERENT, fail, user_errors
+from lapwing.cli.error_exit import DIFFERENT, fail
 from lapwing.cli.options import LogFile
 from lapwing.cli.output_paths import check_distinct, check_log, claim, claim_folder
+from lapwing.cosim.output_lock import write_errors
 
 if TYPE_CHECKING:
     from lapwing.studies.logs.log_comparison import Comparison
@@ -22,17 +23,16 @@ def info(log: LogFile) -> None:
     from lapwing.studies.logs.log_info import info as look
     from lapwing.studies.terminal import console
 
-    with user_errors():
-        result = look(log)
-        for label, line in _about(result).items():
-            typer.echo(f"  {label:<9} {line}")
-        for line in _topics(result):
-            typer.echo(line)
-        flights = fleet(log)
-        for flight in flights:
-            if len(flights) > 1:
-                typer.echo(f"{flight.vehicle}:")
-            show_events(console(), [event._asdict() for event in flight.events])
+    result = look(log)
+    for label, line in _about(result).items():
+        typer.echo(f"  {label:<9} {line}")
+    for line in _topics(result):
+        typer.echo(line)
+    flights = fleet(log)
+    for flight in flights:
+        if len(flights) > 1:
+            typer.echo(f"{flight.vehicle}:")
+        show_events(console(), [event._asdict() for event in flight.events])
 
 
 @app.command()
@@ -51,34 +51,33 @@ def verify(
     """
     from lapwing.cosim.log import LogReader
 
-    with user_errors():
-        if other is not None:
-            if explain:
-                raise ValueError("--explain: describes one log; leave out the second FILE")
-            from lapwing.studies.logs.log_comparison import compare
-
-            check_distinct({"FILE": log, "the second FILE": other})
-            comparison = compare(log, other)
-            for line in _differences(comparison):
-                typer.echo(line)
-            if not comparison.same:
-                fail(f"{log} and {other} differ", DIFFERENT)
-            typer.echo(f"{log} and {other}: identical messages")
-            return
-        with LogReader(log) as read:
-            recorded, computed, metadata = read.metadata.get("digest"), read.digest(), read.metadata
+    if other is not None:
         if explain:
-            from lapwing.studies.logs.reproduction import expectation, facts
+            raise ValueError("--explain: describes one log; leave out the second FILE")
+        from lapwing.studies.logs.log_comparison import compare
 
-            for fact in facts(metadata):
-                note = "same" if fact.recorded == fact.here else f"here {fact.here}"
-                typer.echo(f"  {fact.name:<10} {fact.recorded} ({note})")
-            typer.echo(f"  {'expected':<10} {expectation(metadata)}")
-        if recorded is None:
-            raise ValueError(f"{log}: has no digest; expected a complete log (lapwing recover completes one)")
-        if recorded != computed:
-            fail(f"{log}: digests differ: recorded {recorded}, computed {computed}", DIFFERENT)
-        typer.echo(f"{log}: digest {recorded} is correct")
+        check_distinct({"FILE": log, "the second FILE": other})
+        comparison = compare(log, other)
+        for line in _differences(comparison):
+            typer.echo(line)
+        if not comparison.same:
+            fail(f"{log} and {other} differ", DIFFERENT)
+        typer.echo(f"{log} and {other}: identical messages")
+        return
+    with LogReader(log) as read:
+        recorded, computed, metadata = read.metadata.get("digest"), read.digest(), read.metadata
+    if explain:
+        from lapwing.studies.logs.reproduction import expectation, facts
+
+        for fact in facts(metadata):
+            note = "same" if fact.recorded == fact.here else f"here {fact.here}"
+            typer.echo(f"  {fact.name:<10} {fact.recorded} ({note})")
+        typer.echo(f"  {'expected':<10} {expectation(metadata)}")
+    if recorded is None:
+        raise ValueError(f"{log}: has no digest; expected a complete log (lapwing recover completes one)")
+    if recorded != computed:
+        fail(f"{log}: digests differ: recorded {recorded}, computed {computed}", DIFFERENT)
+    typer.echo(f"{log}: digest {recorded} is correct")
 
 
 @app.command()
@@ -89,14 +88,13 @@ def recover(
     """Write the intact messages of a damaged log to a new log."""
     from lapwing.cosim.log.recover import recover as save
 
-    with user_errors():
-        target = out or log.with_name(f"{log.stem}_recovered.mcap")
-        check_distinct({"FILE": log, "--out": target})
-        check_log(target)
-        result = save(log, target)
-        for line in result.damaged:
-            typer.echo(f"left out: {line}")
-        typer.echo(f"{target}: {result.messages} messages up to t = {result.end_ns * 1e-9:g} s, digest {result.digest}")
+    target = out or log.with_name(f"{log.stem}_recovered.mcap")
+    check_distinct({"FILE": log, "--out": target})
+    check_log(target)
+    result = save(log, target)
+    for line in result.damaged:
+        typer.echo(f"left out: {line}")
+    typer.echo(f"{target}: {result.messages} messages up to t = {result.end_ns * 1e-9:g} s, digest {result.digest}")
 
 
 @app.command()
@@ -115,33 +113,28 @@ def export(
     from lapwing.cosim.log import LogReader
     from lapwing.studies.logs import log_export as tables
 
-    with user_errors():
-        if not (parquet or csv or mat):
-            raise ValueError("export: expected --parquet FOLDER, --csv FOLDER or --mat FILE")
-        check_distinct({"FILE": log, "--parquet": parquet, "--csv": csv, "--mat": mat})
-        claim(mat)
-        with LogReader(log) as read:
-            result = tables.tables(read, topics.split(",") if topics is not None else None)
-        for folder, write in ((parquet, tables.write_parquet), (csv, tables.write_csv), (mat, tables.write_mat)):
-            if folder is None:
-                continue
-            try:
-                if folder is not mat:
-                    folder.mkdir(exist_ok=True)
-                    claim_folder(folder)
-                for path in write(result, folder):
-                    typer.echo(path)
-            except OSError as error:
-                raise ValueError(f"{folder}: cannot be written: {(error.strerror or str(error)).lower()}") from None
+    if not (parquet or csv or mat):
+        raise ValueError("export: expected --parquet FOLDER, --csv FOLDER or --mat FILE")
+    check_distinct({"FILE": log, "--parquet": parquet, "--csv": csv, "--mat": mat})
+    claim(mat)
+    with LogReader(log) as read:
+        result = tables.tables(read, topics.split(",") if topics is not None else None)
+    for folder, write in ((parquet, tables.write_parquet), (csv, tables.write_csv), (mat, tables.write_mat)):
+        if folder is None:
+            continue
+        with write_errors(folder):
+            if folder is not mat:
+                folder.mkdir(exist_ok=True)
+                claim_folder(folder)
+            for path in write(result, folder):
+                typer.echo(path)
 
 
 def _about(info: "Info") -> dict[str, str]:
     """Return the header lines of `info` by label."""
+    from lapwing.studies.flight_provenance import solver_and_exchange
+
     metadata = info.metadata
-    solver = (
-        f"{metadata['solver_integrator']}, step {metadata['solver_step']} s" if "solver_integrator" in metadata else ""
-    )
-    exchange = f"{metadata['exchange_rate']} Hz, {metadata.get('coupling', '')}" if "exchange_rate" in metadata else ""
     count = sum(topic.messages for topic in info.topics)
     lines = {
         "scene": metadata.get("scene", ""),
@@ -149,8 +142,7 @@ def _about(info: "Info") -> dict[str, str]:
         "seed": metadata.get("seed", ""),
         "mode": metadata.get("mode", ""),
         "version": " ".join(filter(None, (metadata.get("version", ""), metadata.get("commit", "")))),
-        "solver": solver,
-        "exchange": exchange,
+        **solver_and_exchange(metadata),
         "duration": f"{info.end - info.start:g} s, from {info.start:g} to {info.end:g} s",
         "size": f"{info.size / 1e6:.2f} MB, {count} messages",
         "files": ", ".join(info.files),

@@ -11,7 +11,7 @@ import typer
 
 from lapwing.cli.app import app
 from lapwing.cli.endpoint_checks import check_published
-from lapwing.cli.error_exit import fail, user_errors
+from lapwing.cli.error_exit import fail
 from lapwing.cli.options import KeyPrefix, LinkOptions, LogFile, Speed, parse_speed, with_options
 from lapwing.cli.output_paths import check_log
 
@@ -65,41 +65,40 @@ def replay(options: ReplayOptions) -> None:
     from lapwing.services.replay.player import play
 
     log = options.log
-    with user_errors():
-        cut, factor = Cut.of(options.start, options.end), parse_speed(options.speed)
-        options.validate()
-        with ExitStack() as stack:
-            servers = _link_servers(options, factor, stack)
-            viewers = _viewers(options, stack)
-            listeners: list[Callable[[str, int, bytes], None]] = [server.replay for server in servers.values()]
-            listeners += [viewer.put for viewer in viewers]
+    cut, factor = Cut.of(options.start, options.end), parse_speed(options.speed)
+    options.validate()
+    with ExitStack() as stack:
+        servers = _link_servers(options, factor, stack)
+        viewers = _viewers(options, stack)
+        listeners: list[Callable[[str, int, bytes], None]] = [server.replay for server in servers.values()]
+        listeners += [viewer.put for viewer in viewers]
 
-            def wait(seconds: float) -> None:
-                first, *others = servers.values()
-                first.wait(seconds)
-                for other in others:
-                    other.adapter.tick(time.monotonic())
+        def wait(seconds: float) -> None:
+            first, *others = servers.values()
+            first.wait(seconds)
+            for other in others:
+                other.adapter.tick(time.monotonic())
 
-            stop = stack.enter_context(Stop())
-            keyboard = stack.enter_context(Keyboard())
-            count = play(
-                log,
-                options.key_prefix,
-                options.listen,
-                cut,
-                factor,
-                options.loop,
-                options.record,
-                lambda: stop.number is not None,
-                lambda *message: [listener(*message) for listener in listeners],
-                Pace(keyboard.keys, typer.echo, wait if servers else time.sleep),
-                options.topics.split(",") if options.topics is not None else None,
-            )
-            for name, server in servers.items():
-                for line in server.report():
-                    typer.echo(f"mavlink: {f'{name}: ' if len(servers) > 1 else ''}{line}")
-            stop.check()
-        typer.echo(f"{log}: {count} messages published" + (f", recorded to {options.record}" if options.record else ""))
+        stop = stack.enter_context(Stop())
+        keyboard = stack.enter_context(Keyboard())
+        count = play(
+            log,
+            options.key_prefix,
+            options.listen,
+            cut,
+            factor,
+            options.loop,
+            options.record,
+            lambda: stop.number is not None,
+            lambda *message: [listener(*message) for listener in listeners],
+            Pace(keyboard.keys, typer.echo, wait if servers else time.sleep),
+            options.topics.split(",") if options.topics is not None else None,
+        )
+        for name, server in servers.items():
+            for line in server.report():
+                typer.echo(f"mavlink: {f'{name}: ' if len(servers) > 1 else ''}{line}")
+        stop.check()
+    typer.echo(f"{log}: {count} messages published" + (f", recorded to {options.record}" if options.record else ""))
 
 
 def _link_servers(options: ReplayOptions, speed: float | None, stack: ExitStack) -> "dict[str, LinkServer]":
@@ -169,7 +168,7 @@ def resimulate(
     from lapwing.services.common import foreign_code
     from lapwing.studies.terminal import console
 
-    with user_errors(), foreign_code.permission(allow_code):
+    with foreign_code.permission(allow_code):
         with RunProgress(console(), 0.0) as display:
             recorded, computed = runs.resimulate(log, display, allow_code)
         if recorded != computed:

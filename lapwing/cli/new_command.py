@@ -7,7 +7,6 @@ from typing import Annotated
 import typer
 
 from lapwing.cli.app import app
-from lapwing.cli.error_exit import user_errors
 
 new = typer.Typer(help="Create a scene, airframe, effect or other extension.", rich_markup_mode=None)
 app.add_typer(new, name="new")
@@ -19,8 +18,7 @@ ModuleName = Annotated[str, typer.Argument(metavar="NAME", help="name of the mod
 @new.command()
 def scene(name: Annotated[str, typer.Argument(metavar="NAME", help="name of the scene, e.g. my_flight")]) -> None:
     """Create a scene: NAME.toml, a copy of the hover scene."""
-    with user_errors():
-        typer.echo(write_scene(name, Path()))
+    typer.echo(write_scene(name, Path()))
 
 
 @new.command()
@@ -54,9 +52,8 @@ def segment(name: ModuleName) -> None:
 
 
 def _create(kind: str, name: str) -> None:
-    with user_errors():
-        for path in write_module(kind, name, Path()):
-            typer.echo(path)
+    for path in write_module(kind, name, Path()):
+        typer.echo(path)
 
 
 def write_scene(name: str, folder: Path) -> Path:

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from lapwing.cli.error_exit import user_errors
 from lapwing.cli.new_command import new
 from lapwing.cosim.processes.interrupt import Interrupted
 from lapwing.dynamics.config_error import ConfigError
@@ -33,23 +32,22 @@ def vehicle(
     In a terminal, the command asks for each measurement and explains it (see docs/guides/new_airframe.md). Elsewhere,
     measurements without --set are estimated from the others and marked as estimates in the file.
     """
-    with user_errors():
-        values = _parse_values(measured or [])
-        interview = Interview(name, values) if sys.stdin.isatty() else None
-        try:
-            path, remarks = write_vehicle(name, values, Path(), interview.ask if interview else None)
-        except (ValueError, Interrupted):
-            if interview:
-                interview.print_answers()
-            raise
-        typer.echo(path)
-        for remark in remarks:
-            typer.echo(f"lapwing: warning: {remark}", err=True)
-        airframe_option = f"--set vehicle.airframe={path.resolve()}"
-        typer.echo(
-            f"next: lapwing performance {path}; lapwing tune excitation {airframe_option} --out gains.toml; "
-            f"lapwing run hover {airframe_option} --set autopilot.gains={Path('gains.toml').resolve()}"
-        )
+    values = _parse_values(measured or [])
+    interview = Interview(name, values) if sys.stdin.isatty() else None
+    try:
+        path, remarks = write_vehicle(name, values, Path(), interview.ask if interview else None)
+    except (ValueError, Interrupted):
+        if interview:
+            interview.print_answers()
+        raise
+    typer.echo(path)
+    for remark in remarks:
+        typer.echo(f"lapwing: warning: {remark}", err=True)
+    airframe_option = f"--set vehicle.airframe={path.resolve()}"
+    typer.echo(
+        f"next: lapwing performance {path}; lapwing tune excitation {airframe_option} --out gains.toml; "
+        f"lapwing run hover {airframe_option} --set autopilot.gains={Path('gains.toml').resolve()}"
+    )
 
 
 def write_vehicle(

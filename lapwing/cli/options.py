@@ -73,16 +73,14 @@ class LinkOptions:
         typer.Option(metavar="URL", help="MAVLink link to ground stations, e.g. udpout:127.0.0.1:14550 (repeatable)"),
     ] = None
     mavlink_key: Annotated[
-        Path | None,
-        typer.Option(metavar="FILE", help="passphrase file: sign MAVLink, and reject unsigned commands"),
+        Path | None, typer.Option(metavar="FILE", help="passphrase file: sign MAVLink, and reject unsigned commands")
     ] = None
     foxglove: Annotated[
         str | None,
         typer.Option(metavar="HOST:PORT", help="serve live data to Foxglove on this address, e.g. 127.0.0.1:8765"),
     ] = None
     ros2: Annotated[
-        int | None,
-        typer.Option(metavar="DOMAIN", min=0, max=232, help="join this ROS 2 domain (rmw_zenoh)"),
+        int | None, typer.Option(metavar="DOMAIN", min=0, max=232, help="join this ROS 2 domain (rmw_zenoh)")
     ] = None
     ros2_router: Annotated[
         str | None, typer.Option(metavar="HOST:PORT", help="Zenoh router of the ROS 2 domain [127.0.0.1:7447]")
@@ -90,8 +88,7 @@ class LinkOptions:
     insecure: Annotated[
         bool,
         typer.Option(
-            "--insecure",
-            help="allow unauthenticated links: unsigned MAVLink, Zenoh without --keys, remote viewers",
+            "--insecure", help="allow unauthenticated links: unsigned MAVLink, Zenoh without --keys, remote viewers"
         ),
     ] = False
 

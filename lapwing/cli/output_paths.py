@@ -7,7 +7,7 @@ from functools import partial
 from itertools import count
 from pathlib import Path
 
-from lapwing.cosim.output_lock import OutputLock, is_locked
+from lapwing.cosim.output_lock import OutputLock, is_locked, write_errors
 
 _claims = ExitStack()  # locks of the running command's outputs
 
@@ -26,7 +26,7 @@ def claim(path: Path | None) -> None:
     if path is None:
         return
     _create(path)
-    with _write_errors(path):
+    with write_errors(path):
         _claims.callback(OutputLock(path).close)
 
 
@@ -47,7 +47,7 @@ def claim_folder(path: Path, shared: bool = False) -> None:
     Raises:
         ValueError: another process writes it.
     """
-    with _write_errors(path):
+    with write_errors(path):
         _claims.callback(OutputLock(path, shared).close)
 
 
@@ -88,7 +88,7 @@ def check_log(path: Path | None) -> None:
     if path.exists() and not path.is_file() and not path.is_dir():
         raise ValueError(f"{path}: is not a regular file; expected the name of a file to write")
     _create(path)
-    with _write_errors(path):
+    with write_errors(path):
         OutputLock(path).close()
 
 
@@ -96,17 +96,17 @@ def reserve_log(scene: str) -> Path:
     """Create an empty log in `recordings` with a name that no other run has, and return its path."""
     folder = Path("recordings")
     if not folder.exists():
-        with _write_errors(folder):
+        with write_errors(folder):
             folder.mkdir(exist_ok=True)
         _claims.callback(_remove_empty, folder)
     stem = f"{scene}_{time.strftime('%Y-%m-%dT%H-%M-%S')}"
     for number in count(1):
         path = folder / f"{stem}{f'_{number}' if number > 1 else ''}.mcap"
-        try:
-            with _write_errors(path):
+        with write_errors(path):
+            try:
                 path.open("xb").close()
-        except FileExistsError:
-            continue
+            except FileExistsError:
+                continue
         _claims.callback(_remove_empty, path)
         return path
     raise AssertionError
@@ -116,14 +116,13 @@ def reserve_log(scene: str) -> Path:
 def remove_on_failure(log: Path) -> Iterator[None]:
     """Remove a log that was missing or empty before, if the run fails before its first message."""
     is_new = not log.exists() or log.stat().st_size == 0
-    try:
-        yield
-    except OSError as error:
-        raise ValueError(f"{log}: cannot be written: {(error.strerror or str(error)).lower()}") from None
-    except ValueError:
-        if is_new and not is_locked(log) and not _has_messages(log):
-            log.unlink(missing_ok=True)
-        raise
+    with write_errors(log):
+        try:
+            yield
+        except ValueError:
+            if is_new and not is_locked(log) and not _has_messages(log):
+                log.unlink(missing_ok=True)
+            raise
 
 
 def modification_time(path: Path) -> int | None:
@@ -147,7 +146,7 @@ def _create(path: Path) -> None:
     if path.is_dir():
         raise ValueError(f"{path}: is a folder; expected the name of a file to write")
     is_new = not path.exists()
-    with _write_errors(path):
+    with write_errors(path):
         path.open("ab").close()
     if is_new:
         _claims.callback(partial(_remove_empty, path))
@@ -160,17 +159,6 @@ def _remove_empty(path: Path) -> None:
             path.rmdir()
     elif path.exists() and path.stat().st_size == 0 and not is_locked(path):
         path.unlink(missing_ok=True)
-
-
-@contextmanager
-def _write_errors(path: Path) -> Iterator[None]:
-    """Turn an OSError into a ValueError that names the path."""
-    try:
-        yield
-    except FileExistsError:
-        raise
-    except OSError as error:
-        raise ValueError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from None
 
 
 def _has_messages(log: Path) -> bool:

@@ -6,7 +6,6 @@ from typing import Annotated, Any
 import typer
 
 from lapwing.cli.app import app
-from lapwing.cli.error_exit import user_errors
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import claim
 from lapwing.cli.preflight import with_solver_selected
@@ -32,22 +31,21 @@ def protocol(
     from lapwing.cosim.transport.packet_layout import layout
     from lapwing.services.scene_resolver import resolve
 
-    with user_errors():
-        claim(json)
-        claim(plot)
-        setup = resolve(with_solver_selected(scene, set_ or []))
-        result = layout(setup)
-        if plot:
-            from lapwing.studies.service_diagram import draw
+    claim(json)
+    claim(plot)
+    setup = resolve(with_solver_selected(scene, set_ or []))
+    result = layout(setup)
+    if plot:
+        from lapwing.studies.service_diagram import draw
 
-            draw(setup, plot)
-        if json:
-            json.write_text(json_module.dumps(result, indent=1) + "\n", encoding="utf-8")
-        if json or plot:
-            return
-        typer.echo(f"{result['rate']} Hz, {result['interval_ns']} ns per tick, last tick {result['last_tick']}")
-        for name in result["order"]:
-            _show(name, result["services"][name])
+        draw(setup, plot)
+    if json:
+        json.write_text(json_module.dumps(result, indent=1) + "\n", encoding="utf-8")
+    if json or plot:
+        return
+    typer.echo(f"{result['rate']} Hz, {result['interval_ns']} ns per tick, last tick {result['last_tick']}")
+    for name in result["order"]:
+        _show(name, result["services"][name])
 
 
 def _show(name: str, service: dict[str, Any]) -> None:

@@ -7,7 +7,6 @@ from typing import Annotated
 import typer
 
 from lapwing.cli.app import app
-from lapwing.cli.error_exit import user_errors
 from lapwing.cli.options import LogFile
 
 
@@ -30,16 +29,15 @@ def report(
     from lapwing.flight import Flight
     from lapwing.studies.flight_data import SHOWN
 
-    with user_errors():
-        check_distinct({"FILE": log, "the second FILE": other, "--out": out})
-        claim_report("--out", out or log.with_suffix(".html"))
-        labels = _names(names, other)
-        second = Flight.read(other, vehicle, SHOWN) if other else None
-        flight = Flight.read(log, vehicle, SHOWN)
-        for each, name in zip((flight, second), labels, strict=False):
-            if each is not None:
-                each.name = name
-        typer.echo(flight.report(out, second))
+    check_distinct({"FILE": log, "the second FILE": other, "--out": out})
+    claim_report("--out", out or log.with_suffix(".html"))
+    labels = _names(names, other)
+    second = Flight.read(other, vehicle, SHOWN) if other else None
+    flight = Flight.read(log, vehicle, SHOWN)
+    for each, name in zip((flight, second), labels, strict=False):
+        if each is not None:
+            each.name = name
+    typer.echo(flight.report(out, second))
 
 
 @app.command()
@@ -56,14 +54,13 @@ def view(
     from lapwing.rerun import open_in_rerun
     from lapwing.studies.flight_data import SHOWN
 
-    with user_errors():
-        if rerun:
-            open_in_rerun(log)
-            return
-        page = Flight.read(log, only=SHOWN).report()
-        if not webbrowser.open(page.resolve().as_uri()):
-            typer.echo("no browser found; open this page:")
-        typer.echo(page)
+    if rerun:
+        open_in_rerun(log)
+        return
+    page = Flight.read(log, only=SHOWN).report()
+    if not webbrowser.open(page.resolve().as_uri()):
+        typer.echo("no browser found; open this page:")
+    typer.echo(page)
 
 
 @app.command()
@@ -95,15 +92,14 @@ def render(
     from lapwing.studies.view3d.render import Shot, check
     from lapwing.studies.view3d.render import render as draw
 
-    with user_errors():
-        shot = Shot(start, stop, fps, speed, camera, _size(size))
-        check(out, shot)
-        check_distinct({"FILE": log, "--with": other, "--out": out})
-        flights = [Flight.read(path, only=SHOWN) for path in (log, other) if path]
-        claim(out)
-        with step_progress(console(), "pictures", parallel=1) as say:
-            draw(flights, labels(flights), out, shot, partial(say, ""))
-        typer.echo(out)
+    shot = Shot(start, stop, fps, speed, camera, _size(size))
+    check(out, shot)
+    check_distinct({"FILE": log, "--with": other, "--out": out})
+    flights = [Flight.read(path, only=SHOWN) for path in (log, other) if path]
+    claim(out)
+    with step_progress(console(), "pictures", parallel=1) as say:
+        draw(flights, labels(flights), out, shot, partial(say, ""))
+    typer.echo(out)
 
 
 def _names(text: str | None, other: Path | None) -> list[str]:

@@ -1,6 +1,6 @@
 """`lapwing run`: fly a scene, record it, and report."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import replace
 from functools import partial
@@ -11,7 +11,6 @@ import typer
 
 from lapwing.cli import plan_options
 from lapwing.cli.app import app
-from lapwing.cli.error_exit import FLIGHT_FAILED, fail, user_errors
 from lapwing.cli.options import absolute, parse_speed, with_options
 from lapwing.cli.output_paths import (
     check_distinct,
@@ -42,7 +41,7 @@ def run(options: RunOptions) -> None:
     """
     from lapwing.services.common import foreign_code
 
-    with user_errors(), foreign_code.permission(options.allow_code), _start_early(options) as early:
+    with foreign_code.permission(options.allow_code), _start_early(options) as early:
         options.validate()
         scene = _load(options)
         options = _with_ros2_of_scene(options, scene)
@@ -52,8 +51,10 @@ def run(options: RunOptions) -> None:
         spec = _spec(options, scene)
         flights = _fly_and_report(options, scene, spec, early)
         if flights:
-            _compare_with_campaign(options, flights)
-        _check_success(scene, flights)
+            from lapwing.cli import run_summary  # imported after the flight, whose start it would delay
+
+            run_summary.compare_with_campaign(options, flights)
+            run_summary.check_success(scene, flights)
 
 
 @contextmanager
@@ -160,7 +161,7 @@ def _fly_and_report(
     before = modification_time(log)
 
     def report(elapsed: "Elapsed | None") -> "list[Flight]":
-        from lapwing.cli import run_summary  # imported after the flight, whose start it would delay
+        from lapwing.cli import run_summary
         from lapwing.runs.log_events import add_events
 
         if elapsed is None and modification_time(log) == before:
@@ -229,35 +230,3 @@ def _fly(options: RunOptions, spec: "ProcessSpec", log: Path, early: dict[str, C
         from lapwing.runs.live_feed import LiveFeed
 
         return fly(live=LiveFeed(setup, displays).observe)
-
-
-def _compare_with_campaign(options: RunOptions, flights: "Sequence[Flight]") -> None:
-    """Print whether the repeated run ends in the state recorded in its campaign; exit with 4 if it does not."""
-    if options.run_ is None or options.campaign is None:
-        return
-    from lapwing.studies.campaign import single_run
-    from lapwing.studies.metrics import joint_end_state
-
-    recorded = single_run.end_state_of(options.run_, options.campaign)
-    name = f"run {options.run_} of {options.campaign}"
-    if not recorded:
-        typer.echo(f"{name}: not recorded in the campaign yet")
-    elif recorded == joint_end_state(flights):
-        typer.echo(f"{name}: final state bit-for-bit identical")
-    elif options.set_:
-        typer.echo(f"{name}: final state differs, with --set")
-    else:
-        fail(f"{name}: final state differs", FLIGHT_FAILED)
-
-
-def _check_success(scene: "Scene", flights: "Sequence[Flight]") -> None:
-    from lapwing.services.common.success_criteria import Success
-    from lapwing.studies.metrics import metrics
-
-    for flight, vehicle in zip(flights, scene.vehicles or (scene,), strict=False):
-        if unmet := vehicle[Success].unmet(metrics(flight)):
-            vehicle_text = f" of {flight.vehicle}" if scene.vehicles else ""
-            fail(
-                f"flight{vehicle_text} failed: {flight.outcome.kind}; success.require: {'; '.join(unmet)}",
-                FLIGHT_FAILED,
-            )

@@ -47,8 +47,7 @@ class RunOptions(LinkOptions):
         str | None, typer.Option(metavar="ENDPOINT", help="accept Zenoh clients here, e.g. tls/127.0.0.1:7447")
     ] = None
     endpoints: Annotated[
-        str | None,
-        typer.Option(metavar="TABLE", help="name=endpoint,... of all participants, when started separately"),
+        str | None, typer.Option(metavar="TABLE", help="name=endpoint,... of all participants, when started separately")
     ] = None
     external: Annotated[
         list[str] | None,

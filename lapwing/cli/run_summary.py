@@ -5,15 +5,20 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import typer
 from rich.console import Console
 from rich.table import Table
 
+from lapwing.cli.error_exit import FLIGHT_FAILED, fail
+from lapwing.cli.run_options import RunOptions
 from lapwing.cosim.scene import Scene
 from lapwing.flight import Flight
 from lapwing.services.common.run_schema import Published
+from lapwing.services.common.success_criteria import Success
 from lapwing.studies import terminal
 from lapwing.studies.flight_data import SHOWN
 from lapwing.studies.json_file import write_json
+from lapwing.studies.metrics import joint_end_state, metrics
 from lapwing.studies.separation import Separation, nearest
 from lapwing.studies.tracking import unit_and_factor
 
@@ -153,3 +158,32 @@ def _errors(console: Console, published: Published, rmse: dict[str, float]) -> N
             row.append(f"{scale * published.rmse[axis]:.4f}" if axis in published.rmse else "")
         table.add_row(*row)
     console.print(table)
+
+
+def compare_with_campaign(options: RunOptions, flights: Sequence[Flight]) -> None:
+    """Print whether the repeated run ends in the state recorded in its campaign; exit with 4 if it does not."""
+    if options.run_ is None or options.campaign is None:
+        return
+    from lapwing.studies.campaign import single_run  # imports scipy
+
+    recorded = single_run.end_state_of(options.run_, options.campaign)
+    name = f"run {options.run_} of {options.campaign}"
+    if not recorded:
+        typer.echo(f"{name}: not recorded in the campaign yet")
+    elif recorded == joint_end_state(flights):
+        typer.echo(f"{name}: final state bit-for-bit identical")
+    elif options.set_:
+        typer.echo(f"{name}: final state differs, with --set")
+    else:
+        fail(f"{name}: final state differs", FLIGHT_FAILED)
+
+
+def check_success(scene: Scene, flights: Sequence[Flight]) -> None:
+    """Exit with 4 if a flight does not meet success.require of the scene."""
+    for flight, vehicle in zip(flights, scene.vehicles or (scene,), strict=False):
+        if unmet := vehicle[Success].unmet(metrics(flight)):
+            vehicle_text = f" of {flight.vehicle}" if scene.vehicles else ""
+            fail(
+                f"flight{vehicle_text} failed: {flight.outcome.kind}; success.require: {'; '.join(unmet)}",
+                FLIGHT_FAILED,
+            )

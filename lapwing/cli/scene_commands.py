@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 import typer
 
 from lapwing.cli.app import app
-from lapwing.cli.error_exit import user_errors
 from lapwing.cli.options import Overrides
 from lapwing.cli.output_paths import claim
 from lapwing.cli.preflight import warn_of_gains, with_solver_selected
@@ -29,18 +28,17 @@ def scenes(
     from lapwing.cosim.scene import SceneError
     from lapwing.services.common.run_schema import SHIPPED, title
 
-    with user_errors():
-        paths = sorted((folder or SHIPPED).glob("*.toml"))
-        if not paths:
-            raise ValueError(f"{folder}: contains no scenes; expected a folder with .toml files")
-        names = [str(path) if folder else path.stem for path in paths]
-        width = max(map(len, names))
-        for name, path in zip(names, paths, strict=True):
-            try:
-                line = title(path)
-            except SceneError as error:
-                line = f"(broken: {error})"
-            typer.echo(f"{name:<{width}}  {line}")
+    paths = sorted((folder or SHIPPED).glob("*.toml"))
+    if not paths:
+        raise ValueError(f"{folder}: contains no scenes; expected a folder with .toml files")
+    names = [str(path) if folder else path.stem for path in paths]
+    width = max(map(len, names))
+    for name, path in zip(names, paths, strict=True):
+        try:
+            line = title(path)
+        except SceneError as error:
+            line = f"(broken: {error})"
+        typer.echo(f"{name:<{width}}  {line}")
 
 
 @app.command()
@@ -67,7 +65,7 @@ def check(
     from lapwing.services.common.vehicle_schema import Vehicle
     from lapwing.services.scene_resolver import resolve
 
-    with user_errors(), foreign_code.permission(allow_code):
+    with foreign_code.permission(allow_code):
         if json and not accuracy:
             raise ValueError("--json: holds the errors of a flight; give --accuracy, too")
         claim(json)
@@ -107,14 +105,14 @@ def _accuracy_of_log(log: Path, accuracy: bool, overrides: list[str], allow_code
     if not accuracy:
         raise ValueError(f"{log}: is a log; give --accuracy to measure its solver, or use lapwing info")
     values = with_values({}, overrides)
-    asked = values.get("solver", {}).get("accuracy")
-    if values not in ({}, {"solver": {"accuracy": asked}}):
+    limit = values.get("solver", {}).get("accuracy")
+    if values not in ({}, {"solver": {"accuracy": limit}}):
         raise ValueError("--set: the solver of a log is the recorded one; only solver.accuracy can be set")
-    if asked is not None and not (isinstance(asked, int | float) and asked > 0.0):
-        raise ValueError(f"--set solver.accuracy: expected a number above 0, got {asked!r}")
+    if limit is not None and not (isinstance(limit, int | float) and limit > 0.0):
+        raise ValueError(f"--set solver.accuracy: expected a number above 0, got {limit!r}")
     run = recorded_run(log, allow_code)
-    flown = {"operator": run.operators, "recorded": run.firmware}
-    return flight_accuracy.measure_recorded(run.setup._replace(last_tick=run.last), flown, _with_bar, asked)
+    inputs = {"operator": run.operators, "recorded": run.firmware}
+    return flight_accuracy.measure_recorded(run.setup._replace(last_tick=run.last), inputs, _with_bar, limit)
 
 
 def _accuracy_met(result: "FlightAccuracy", json: Path | None) -> bool:
@@ -158,20 +156,19 @@ def precompile(
     from lapwing.services.scene_resolver import resolve
     from lapwing.studies.terminal import console
 
-    with user_errors():
-        paths = [each for items in scenes or [Path("delivery_mission")] for each in _scenes_of(items)]
-        sound: dict[str, Any] = {}
-        faults: list[ValueError] = []
-        for path in paths:
-            try:
-                sound[str(path)] = resolve(with_solver_selected(path, []))
-            except ValueError as fault:
-                faults.append(fault)
-        compile_ahead(sound, console())
-        for other in faults[:-1]:
-            typer.echo(f"lapwing: {other}", err=True)
-        if faults:
-            raise faults[-1]
+    paths = [each for items in scenes or [Path("delivery_mission")] for each in _scenes_of(items)]
+    sound: dict[str, Any] = {}
+    faults: list[ValueError] = []
+    for path in paths:
+        try:
+            sound[str(path)] = resolve(with_solver_selected(path, []))
+        except ValueError as fault:
+            faults.append(fault)
+    compile_ahead(sound, console())
+    for other in faults[:-1]:
+        typer.echo(f"lapwing: {other}", err=True)
+    if faults:
+        raise faults[-1]
 
 
 def _scenes_of(path: Path) -> list[Path]:
@@ -198,21 +195,20 @@ def parameters(
     from lapwing.services.common.autopilot_parameters import apply_commands
     from lapwing.services.scene_resolver import resolve
 
-    with user_errors():
-        commands: list = []
-        if file.suffix == ".toml":
-            setup = resolve(with_solver_selected(file, []))
-        else:
-            with LogReader(file) as read:
-                setup = recorded_setup(read)
-                commands = [command for _, items in recorded_commands(read, setup) for command in items]
-        if not setup.vehicle:
-            raise ValueError(f"{file}: has {len(setup.vehicles)} vehicles; expected a scene or log with one vehicle")
-        if "autopilot" not in setup.services:
-            raise ValueError(f"{file}: no autopilot; expected a scene with [autopilot], or its log")
-        known = {p.name: p for p in setup.services["autopilot"].parameters.parameters}
-        values = apply_commands(known, commands)
-        if save:
-            parameter_file.write(save, known.values(), values)
-        for p in known.values():
-            typer.echo(f"{p.name:<16} {values[p.name]:<12.6g} {p.unit:<6} {p.least:g} to {p.most:g}: {p.meaning}")
+    commands: list = []
+    if file.suffix == ".toml":
+        setup = resolve(with_solver_selected(file, []))
+    else:
+        with LogReader(file) as read:
+            setup = recorded_setup(read)
+            commands = [command for _, items in recorded_commands(read, setup) for command in items]
+    if not setup.vehicle:
+        raise ValueError(f"{file}: has {len(setup.vehicles)} vehicles; expected a scene or log with one vehicle")
+    if "autopilot" not in setup.services:
+        raise ValueError(f"{file}: no autopilot; expected a scene with [autopilot], or its log")
+    known = {p.name: p for p in setup.services["autopilot"].parameters.parameters}
+    values = apply_commands(known, commands)
+    if save:
+        parameter_file.write(save, known.values(), values)
+    for p in known.values():
+        typer.echo(f"{p.name:<16} {values[p.name]:<12.6g} {p.unit:<6} {p.least:g} to {p.most:g}: {p.meaning}")

@@ -9,7 +9,6 @@ import typer
 from lapwing.cli import plan_options
 from lapwing.cli.app import app
 from lapwing.cli.endpoint_checks import check_endpoints
-from lapwing.cli.error_exit import user_errors
 from lapwing.cli.options import (
     KeyPrefix,
     Keys,
@@ -58,39 +57,38 @@ def service(options: ServiceOptions) -> None:
     from lapwing.services.scene_resolver import resolve
 
     name, scene, overrides, plan = options.name, options.scene, options.set_ or [], options.plan or []
-    with user_errors():
-        check_key_prefix(options.key_prefix)
-        table = parse_endpoints(options.endpoints)
-        entry = process_table.entry(process_table.service_of_encoder(name) or name)
-        if name not in table:
-            raise ValueError(f"--endpoints: no endpoint for {name} itself")
-        check_endpoints("--endpoints", table.values(), options.keys, options.insecure)
-        check_endpoints("--listen", options.listen or [], options.keys, options.insecure)
-        required = {
-            process_table.RECORDER: ("--log FILE", options.log),
-            process_table.FOXGLOVE: ("--foxglove HOST:PORT", options.foxglove),
-            process_table.ROS2: ("--ros2 DOMAIN", options.ros2),
-        }
-        if name in required and required[name][1] is None:
-            raise ValueError(f"service {name}: expected {required[name][0]}")
-        options.validate_links()
-        loaded = with_solver_selected(scene, [*overrides, *plan_options.overrides(plan, scene, overrides)])
-        setup = resolve(loaded, plan_options.commands(plan, loaded))
-        if entry.lock_step and entry.name not in setup.services:
-            typer.echo(f"{name}: not part of {scene}")  # compose starts every service
-            return
-        run_participant(
-            ProcessSpec(
-                name=name,
-                setup=setup,
-                peers=table,
-                key_prefix=options.key_prefix,
-                speed=parse_speed(options.speed),
-                log=str(options.log or ""),
-                sources={source: content.decode() for source, content in loaded.sources.items()},
-                open=tuple(options.listen or ()),
-                external=external_services(table),
-                keys=absolute(options.keys),
-                **options.spec,
-            )
+    check_key_prefix(options.key_prefix)
+    table = parse_endpoints(options.endpoints)
+    entry = process_table.entry(process_table.service_of_encoder(name) or name)
+    if name not in table:
+        raise ValueError(f"--endpoints: no endpoint for {name} itself")
+    check_endpoints("--endpoints", table.values(), options.keys, options.insecure)
+    check_endpoints("--listen", options.listen or [], options.keys, options.insecure)
+    required = {
+        process_table.RECORDER: ("--log FILE", options.log),
+        process_table.FOXGLOVE: ("--foxglove HOST:PORT", options.foxglove),
+        process_table.ROS2: ("--ros2 DOMAIN", options.ros2),
+    }
+    if name in required and required[name][1] is None:
+        raise ValueError(f"service {name}: expected {required[name][0]}")
+    options.validate_links()
+    loaded = with_solver_selected(scene, [*overrides, *plan_options.overrides(plan, scene, overrides)])
+    setup = resolve(loaded, plan_options.commands(plan, loaded))
+    if entry.lock_step and entry.name not in setup.services:
+        typer.echo(f"{name}: not part of {scene}")  # compose starts every service
+        return
+    run_participant(
+        ProcessSpec(
+            name=name,
+            setup=setup,
+            peers=table,
+            key_prefix=options.key_prefix,
+            speed=parse_speed(options.speed),
+            log=str(options.log or ""),
+            sources={source: content.decode() for source, content in loaded.sources.items()},
+            open=tuple(options.listen or ()),
+            external=external_services(table),
+            keys=absolute(options.keys),
+            **options.spec,
         )
+    )

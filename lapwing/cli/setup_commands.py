@@ -8,7 +8,6 @@ from typing import Annotated
 import typer
 
 from lapwing.cli.app import app
-from lapwing.cli.error_exit import user_errors
 from lapwing.cli.output_paths import claim
 
 
@@ -28,13 +27,12 @@ def schema(
     """Write a JSON schema with which editors check TOML files."""
     from lapwing.file_schemas.json_schema import SCHEMAS
 
-    with user_errors():
-        text = json.dumps(SCHEMAS[kind.value](), indent=1) + "\n"
-        if out is None:
-            typer.echo(text, nl=False)
-        else:
-            claim(out)
-            out.write_text(text, encoding="utf-8")
+    text = json.dumps(SCHEMAS[kind.value](), indent=1) + "\n"
+    if out is None:
+        typer.echo(text, nl=False)
+    else:
+        claim(out)
+        out.write_text(text, encoding="utf-8")
 
 
 @app.command()
@@ -50,7 +48,6 @@ def certificates(
     from lapwing.cosim.access.zenoh_access import VIEWER
     from lapwing.services.security import names
 
-    with user_errors():
-        holders = [*names(), VIEWER]
-        make(folder, holders, days)
-        typer.echo(f"{folder}: certificates of {', '.join(holders)}; copy to each host only its own, commit none")
+    holders = [*names(), VIEWER]
+    make(folder, holders, days)
+    typer.echo(f"{folder}: certificates of {', '.join(holders)}; copy to each host only its own, commit none")

@@ -5,7 +5,6 @@ from typing import Annotated
 import typer
 
 from lapwing.cli.app import app
-from lapwing.cli.error_exit import user_errors
 
 
 @app.command()
@@ -18,5 +17,4 @@ def studio(
     """
     from lapwing.studio.server import serve
 
-    with user_errors():
-        serve(port, typer.echo)
+    serve(port, typer.echo)

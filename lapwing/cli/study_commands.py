@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from lapwing.cli.app import app
-from lapwing.cli.error_exit import fail, user_errors
+from lapwing.cli.error_exit import fail
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import check_distinct, claim, claim_named, claim_plot
 from lapwing.studies.tune.bandwidths import Bandwidths
@@ -62,8 +62,7 @@ def performance(
     from lapwing.studies import performance_card as study
     from lapwing.studies.terminal import console
 
-    with user_errors():
-        _study("SCENE|VEHICLE", subject, json, None, console(), lambda: study.card(subject), study)
+    _study("SCENE|VEHICLE", subject, json, None, console(), lambda: study.card(subject), study)
 
 
 @app.command()
@@ -84,16 +83,15 @@ def effects(
     from lapwing.studies.effects.procedure import Study, study
     from lapwing.studies.terminal import console
 
-    with user_errors():
-        if not tolerance > 0.0:
-            raise ValueError(f"--tolerance {tolerance:g}: expected a distance above 0 m")
-        screen = console()
+    if not tolerance > 0.0:
+        raise ValueError(f"--tolerance {tolerance:g}: expected a distance above 0 m")
+    screen = console()
 
-        def find() -> Study:
-            with StudyProgress(screen, "flights") as progress:
-                return study(load(scene, set_ or []), tolerance, progress.say)
+    def find() -> Study:
+        with StudyProgress(screen, "flights") as progress:
+            return study(load(scene, set_ or []), tolerance, progress.say)
 
-        _study("SCENE", scene, json, plot, screen, find, console_output)
+    _study("SCENE", scene, json, plot, screen, find, console_output)
 
 
 @app.command()
@@ -113,12 +111,11 @@ def accuracy(
 
     The subject is a reference problem with a known solution, or the plant of a scene.
     """
-    with user_errors():
-        from lapwing.studies.accuracy import accuracy_command
+    from lapwing.studies.accuracy import accuracy_command
 
-        console = accuracy_command.console()
-        find = partial(accuracy_command.study, console, target, set_ or [], goal)
-        _study("TARGET", Path(target), json, plot, console, find, accuracy_command)
+    console = accuracy_command.console()
+    find = partial(accuracy_command.study, console, target, set_ or [], goal)
+    _study("TARGET", Path(target), json, plot, console, find, accuracy_command)
 
 
 @app.command()
@@ -136,13 +133,12 @@ def stability(
     Each case is also run with a baseline method that fails it.
     Exit codes: 1 a case misses its bound, 2 invalid input.
     """
-    with user_errors():
-        from lapwing.studies.stability import stability_command
+    from lapwing.studies.stability import stability_command
 
-        check_distinct({"--json": json, "--report": report})
-        claim(json)
-        claim_named("--report", report, ".html")
-        passed = stability_command.run(case, slow, sweep, json, report)
+    check_distinct({"--json": json, "--report": report})
+    claim(json)
+    claim_named("--report", report, ".html")
+    passed = stability_command.run(case, slow, sweep, json, report)
     if not passed:
         raise SystemExit(1)
 
@@ -185,32 +181,31 @@ def tune(
     from lapwing.studies.tune import console_output, gain_refinement, procedure
     from lapwing.studies.tune import tuning_report as page
 
-    with user_errors():
-        check_distinct({"SCENE": scene, "--from": log, "--out": out, "--report": report})
-        claim_named("--out", out, ".toml")
-        claim_named("--report", report, ".html")
-        target, screen = Bandwidths(altitude, yaw, attitude, position), console()
-        loaded, flown = load(scene, set_ or []), count(1)
-        with step_progress(screen, "gain sets at most") as progress:
+    check_distinct({"SCENE": scene, "--from": log, "--out": out, "--report": report})
+    claim_named("--out", out, ".toml")
+    claim_named("--report", report, ".html")
+    target, screen = Bandwidths(altitude, yaw, attitude, position), console()
+    loaded, numbers = load(scene, set_ or []), count(1)
+    with step_progress(screen, "gain sets at most") as progress:
 
-            def show(text: str, done: int = 0) -> None:
-                progress(text, done, gain_refinement.CANDIDATES)
+        def show(text: str, done: int = 0) -> None:
+            progress(text, done, gain_refinement.CANDIDATES)
 
-            show("linearising")
-            with notify_on_compile(resolve(loaded), lambda _: show("compiling, then flying")):
-                result = procedure.tune(
-                    loaded,
-                    target,
-                    lambda text: screen.print(text, soft_wrap=True),
-                    log,
-                    lambda: show("flying gain sets", next(flown)),
-                )
-        console_output.show(screen, result)
-        if out and (force or not result.failures):
-            procedure.write(out, result.gains)
-            typer.echo(f'{out}: use it with [autopilot] gains = "{out.name}"')
-        if report:
-            page.write(report, result)
-            typer.echo(f"{report}: Bode plots, margins and steps")
-        if out and result.failures and not force:
-            fail(f"{out}: not written, the gains fail {'; '.join(result.failures)}; use --force to write them", 1)
+        show("linearising")
+        with notify_on_compile(resolve(loaded), lambda _: show("compiling, then flying")):
+            result = procedure.tune(
+                loaded,
+                target,
+                lambda text: screen.print(text, soft_wrap=True),
+                log,
+                lambda: show("flying gain sets", next(numbers)),
+            )
+    console_output.show(screen, result)
+    if out and (force or not result.failures):
+        procedure.write(out, result.gains)
+        typer.echo(f'{out}: use it with [autopilot] gains = "{out.name}"')
+    if report:
+        page.write(report, result)
+        typer.echo(f"{report}: Bode plots, margins and steps")
+    if out and result.failures and not force:
+        fail(f"{out}: not written, the gains fail {'; '.join(result.failures)}; use --force to write them", 1)

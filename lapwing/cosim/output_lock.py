@@ -1,11 +1,22 @@
-"""Advisory locks (flock) that keep two processes from writing the same log, file or folder."""
+"""Output files: errors of writing, and advisory locks (flock) that keep two processes from writing the same file."""
 
 import fcntl
 import os
 import stat
+from collections.abc import Iterator
+from contextlib import contextmanager
 from errno import EWOULDBLOCK
 from io import FileIO
 from pathlib import Path
+
+
+@contextmanager
+def write_errors(path: str | Path) -> Iterator[None]:
+    """Turn an OSError into a ValueError that names the path."""
+    try:
+        yield
+    except OSError as error:
+        raise ValueError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from None
 
 
 class OutputLock:

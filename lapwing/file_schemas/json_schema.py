@@ -102,11 +102,7 @@ def gains_schema() -> Schema:
     return {**_head("Lapwing gain set"), **table_schema(GainSet)}
 
 
-SCHEMAS: dict[str, Callable[[], Schema]] = {
-    "scene": scene_schema,
-    "airframe": airframe_schema,
-    "gains": gains_schema,
-}
+SCHEMAS: dict[str, Callable[[], Schema]] = {"scene": scene_schema, "airframe": airframe_schema, "gains": gains_schema}
 
 
 def _head(title: str) -> Schema:

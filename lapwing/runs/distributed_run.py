@@ -9,8 +9,9 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.processes.interrupt import Stop
 from lapwing.cosim.processes.run_monitor import MONITOR, RunMonitor
 from lapwing.cosim.run_errors import RunFailed
-from lapwing.cosim.transport.bus import ZenohBus, mesh
+from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import ALIVE_KEY, ENCODER, check_key_prefix
+from lapwing.cosim.transport.session_settings import mesh
 from lapwing.runs.multi_process_run import Clock
 from lapwing.runs.observer import Elapsed, Observer
 from lapwing.services import process_table

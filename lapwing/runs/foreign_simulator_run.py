@@ -10,10 +10,9 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.kernels import python_function
 from lapwing.services.common import ports
 from lapwing.services.common.environment_schema import environment
-from lapwing.services.common.firmware.motor_order import motor_order
+from lapwing.services.common.firmware.motor_order import QUADROTOR_X, motor_order
 from lapwing.services.common.vehicle_schema import airframe
 from lapwing.services.process_table import create
-from lapwing.services.px4.resolve import LAYOUT
 from lapwing.services.px4.simulator_blocks import NAME, Receiver, Sender, SimulatorSetup
 from lapwing.services.px4.simulator_client import SimulatorClient
 from lapwing.services.px4.simulator_readings import PROVIDED
@@ -58,7 +57,7 @@ def on_simulator(scene: Scene, setup: RunConfig, host: str, port: int) -> RunCon
         host,
         port,
         nominal,
-        motor_order(frame, LAYOUT, "px4"),
+        motor_order(frame, QUADROTOR_X, "px4"),
         frame.motor.max_voltage,
         environment(scene).home,
         setup.interval_ns,

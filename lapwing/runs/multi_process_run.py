@@ -64,7 +64,7 @@ def fly_processes(
             live(watch)
             return clock.observe(watch) or stop.number is not None
 
-        outputs = launch(names, send_spec, participants, observe, auxiliary, external, early, setup.services)
+        outputs = launch(names, send_spec, participants, observe, [*auxiliary], external, early or {}, setup.services)
         for name, output in outputs.items():
             for line in output.splitlines():
                 observer.say(f"{name}: {line}")

@@ -5,8 +5,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, Self
 
-import numpy as np
-
 from lapwing.cosim.config.provenance import DIVERGED, FAILURE
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.diagram.multi_vehicle import members
@@ -34,13 +32,12 @@ from lapwing.services.common import ports
 from lapwing.studies import tracking
 from lapwing.studies.flight_events import IMU_SELECTION, Event, events, imu_failures, in_order, slack
 from lapwing.studies.flight_provenance import Origin
-from lapwing.studies.flight_topics import FlightTopics
+from lapwing.studies.flight_tracking import FlightTracking
 from lapwing.studies.mission import Mission, mission_of
 from lapwing.studies.outcome import LANDED, FlightOutcome, classify
 from lapwing.studies.port_columns import columns_of
 from lapwing.studies.topic_view import TopicView
 
-AXES = tuple(tracking.AXES)
 IN_SPACE = (TRUTH, BODIES, CONTACT, SETPOINT, ACTUATORS, SONAR, RANGEFINDER)  # topics for drawing a vehicle in 3D
 FLEET_TOPICS = (*IN_SPACE, STATUS)  # topics of the other vehicles of a fleet: for drawing, and for their outcomes
 
@@ -48,7 +45,7 @@ FLEET_TOPICS = (*IN_SPACE, STATUS)  # topics of the other vehicles of a fleet: f
 SHOWN = (*IN_SPACE, STATUS, ESTIMATE, ESTIMATE_COVARIANCE, LIFT, BATTERY, EVENTS, custom_sensor(ports.IMU_SELECTION))
 
 
-class FlightData(FlightTopics):
+class FlightData(FlightTracking):
     """Recorded topics of a flight, and the metrics derived from them.
 
     The first axis of `flight.truth.position` is time, at `flight.truth.times`; `flight.topic(NAME)` is any topic.
@@ -164,61 +161,6 @@ class FlightData(FlightTopics):
     def __repr__(self) -> str:
         text = str(self.outcome) if len(self.truth) else "no ground truth"
         return f"<Flight of {self.metadata.get('scene', self.origin.source)}: {text}>"
-
-    @cached_property
-    def reference(self) -> np.ndarray:
-        """Reference x, y, z [m], roll, pitch, yaw [rad] at the first n times of "ground_truth", shape (n, 6).
-
-        The references of x, y, z and yaw are the setpoints; those of roll and pitch are the references of the inner
-        loops. The run may have ended between two topics: n is the length of the shortest, 0 without a reference.
-        """
-        if not self._tracked:
-            return np.empty((0, len(AXES)))
-        position, roll_pitch, yaw = self._reference
-        return np.column_stack([position, roll_pitch, yaw])
-
-    @cached_property
-    def _tracked(self) -> int:
-        """Number of times of `reference`."""
-        if not (self.has("setpoint") and self.has("actuators")):
-            return 0
-        return min(len(self.truth), len(self.setpoint), len(self.actuators))
-
-    @property
-    def _reference(self) -> tracking.Reference:
-        n, setpoint = self._tracked, self.setpoint
-        return tracking.Reference(setpoint.position[:n], self.actuators.attitude_reference[:n, :2], setpoint.yaw[:n])
-
-    @cached_property
-    def armed(self) -> np.ndarray:
-        """True where the motors are armed, at the times of `reference`, shape (n,)."""
-        n = self._tracked
-        return self.actuators.armed[:n] if n else np.empty(0, dtype=bool)
-
-    @cached_property
-    def errors(self) -> dict[str, np.ndarray]:
-        """Reference minus truth of each axis [m], [rad] while the motors are armed; empty without a reference."""
-        n = len(self.reference)
-        if n == 0:
-            return {}
-        result = tracking.errors(self.reference, self.truth.position[:n], self.truth.attitude[:n], self.armed)
-        return dict(zip(AXES, result.T, strict=True))
-
-    def rmse_of(self, pose: TopicView) -> dict[str, float]:
-        """Return the root-mean-square error of each axis [m], [rad] of a pose topic, for a flight with a reference."""
-        n = self._tracked
-        return tracking.rmse(self._reference, pose.position[:n], pose.attitude[:n], self.armed)
-
-    @cached_property
-    def reach(self) -> tuple[float, float]:
-        """Largest distance from the reference, and overshoot beyond its extremes [m], for a flight with a reference."""
-        n = self._tracked
-        return tracking.reach(self.setpoint.position[:n], self.truth.position[:n], self.armed)
-
-    @cached_property
-    def rmse(self) -> dict[str, float]:
-        """Root-mean-square error of each axis [m], [rad]; empty without a reference."""
-        return self.rmse_of(self.truth) if self._tracked else {}
 
     @property
     def energy(self) -> float:

@@ -12,6 +12,13 @@ from lapwing.cosim.config.serialise import from_json
 from lapwing.cosim.diagram.multi_vehicle import member
 
 
+def solver_and_exchange(metadata: Mapping[str, str]) -> dict[str, str]:
+    """Return the texts of "solver" and "exchange" of a log; "" if the log has none."""
+    solver = "{solver_integrator}, step {solver_step} s" if "solver_integrator" in metadata else ""
+    exchange = f"{metadata['exchange_rate']} Hz, {metadata.get('coupling', '')}" if "exchange_rate" in metadata else ""
+    return {"solver": solver.format_map(metadata), "exchange": exchange}
+
+
 class Origin:
     """Origin of a flight: a log, or a run configuration simulated in memory.
 

@@ -20,6 +20,10 @@ from lapwing.cosim.run_errors import RunFailed
 NO_TRACKER_WARNING = "ignore::UserWarning:multiprocessing.resource_tracker"
 
 
+Workers = Callable[[Callable[..., Any], Iterable[tuple]], Iterator[tuple[int, Any]]]
+"""(call, tasks) -> (index of the task, call(*task)) in order of completion."""
+
+
 @contextmanager
 def workers(number: int) -> Iterator[ProcessPoolExecutor]:
     """Yield a pool of processes that end with the block, immediately on an error, or with this process.
@@ -46,7 +50,7 @@ def run_here(call: Callable[..., Any], tasks: Iterable[tuple]) -> Iterator[tuple
         yield index, call(*task)
 
 
-def processes(count: int) -> Callable[[Callable[..., Any], Iterable[tuple]], Iterator[tuple[int, Any]]]:
+def processes(count: int) -> Workers:
     """Return a function like `run_here` that uses `count` processes and yields results as they complete."""
 
     def run(call: Callable[..., Any], tasks: Iterable[tuple]) -> Iterator[tuple[int, Any]]:

@@ -13,20 +13,19 @@ from lapwing.cosim.diagram.compiled_block import InputRing
 from lapwing.services.ardupilot.exchange import OUTPUTS, PWM_MAX, PWM_MIN, ArduPilotExchange
 from lapwing.services.ardupilot.frame_sequence import Frame, FrameSequence
 from lapwing.services.ardupilot.modes import CONVENTIONS
-from lapwing.services.ardupilot.resolve import LOOP_RATE, ArduPilotSetup
+from lapwing.services.ardupilot.resolve import LOOP_RATE, NAME, ArduPilotSetup
 from lapwing.services.ardupilot.sample import Samples
 from lapwing.services.ardupilot.servo_packet import ServoPacket, decode, throttle
 from lapwing.services.ardupilot.simulated_sensors import SimulatedSensors
 from lapwing.services.common import ports
-from lapwing.services.common.firmware.datagrams import DatagramSocket
+from lapwing.services.common.firmware.datagrams import DatagramSocket, bound_socket
 from lapwing.services.common.firmware.exchange import INVALID, LAST_START, POLL, SEND, Shared, empty_ring
-from lapwing.services.common.firmware.flight_status import FlightStatus
-from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, LinkReport, Read, Waits
+from lapwing.services.common.firmware.flight_status import poll_flight
+from lapwing.services.common.firmware.link import FirmwareOutput, LinkReport, Read, Waits
 from lapwing.services.common.firmware.mavlink_transport import TcpTransport
 from lapwing.services.common.firmware.mission import mission_items, mission_messages
 from lapwing.services.common.firmware.mission_client import MissionClient
-from lapwing.services.common.firmware.patience import Patience
-from lapwing.services.common.firmware.program import Program
+from lapwing.services.common.firmware.program import Program, ProgramLink
 from lapwing.services.common.firmware.setup import FirmwareSetup, first_free
 from lapwing.services.common.ports import AirspeedReading, DistanceReading, ImuReading
 
@@ -37,7 +36,7 @@ PARAMETERS_FILE = "lapwing.parm"
 PARAMETERS = {"AUTO_OPTIONS": 3.0, "SIM_SPEEDUP": 1000.0}  # arm and take off in AUTO; no time control
 
 
-class ArduPilotLink:
+class ArduPilotLink(ProgramLink):
     """Connection to one ArduPilot SITL."""
 
     outputs = OUTPUTS
@@ -48,11 +47,8 @@ class ArduPilotLink:
         self._own: ArduPilotSetup = setup.own
         self.report = LinkReport("ardupilot")
         self._sequence, self._socket = FrameSequence(), DatagramSocket()
-        self._program: Program | None = None
         self._client: MissionClient | None = None
-        self._status: FlightStatus | None = None
         self._simulated: SimulatedSensors | None = None
-        self._time = 0.0  # [s] simulation time
         self._packet: ServoPacket | None = None
         self._was_resent = False  # a frame was resent since the last answer
 
@@ -93,9 +89,8 @@ class ArduPilotLink:
         self._client = MissionClient(
             TcpTransport(setup.host, port), CONVENTIONS, mission_messages(items, self._own.datum), parameters
         )
-        self._status = FlightStatus("ardupilot", self._client)
         self._simulated = SimulatedSensors(self._own, self._client)
-        patience = Patience(setup.start_timeout, self._program.pid if self._program else None)
+        patience = self._patience(setup.start_timeout)
         while self._packet is None:
             waits(f"ardupilot on udp {self.address[0]}:{self.address[1]}")
             self._client.read()  # ArduPilot waits for a connection before it starts
@@ -132,13 +127,12 @@ class ArduPilotLink:
     def _poll(self, tick: int, read: Read) -> FirmwareOutput:
         """Poll the MAVLink link. Return the state of the flight."""
         assert self._client is not None
-        assert self._status is not None
         assert self._simulated is not None
-        self._status.poll(self._time)
-        self.report.version = self._status.version
+        result = poll_flight(NAME, self._client, self._time)
+        self.report.version = self._client.version
         self._simulated.update(self._time, read, tuple(self._shared.outputs))
         self._shared.next_poll[0] = max(tick + 1, math.floor(self._client.next_poll / self._setup.interval))
-        return self._status.output((), running=False)
+        return result
 
     def _await(self, size: int, waits: Waits) -> None:
         """Wait for the next servo packet, after compiled code received `size` bytes that were not this packet.
@@ -148,9 +142,8 @@ class ArduPilotLink:
         """
         self._packet, self._was_resent = None, False
         self._process(size)
-        patience: Patience | None = None
+        patience = self._patience(self._setup.step_timeout)
         while self._packet is None:
-            patience = patience or self._patience()
             waits("ardupilot")
             self._check(patience, "no servo packet", "check that it runs and that its steps are not blocked")
             size = self._socket.receive()
@@ -162,10 +155,6 @@ class ArduPilotLink:
                 self._client.read()  # ArduPilot waits for a connection before it starts again
         self._shared.outputs[:] = [throttle(pwm, PWM_MIN, PWM_MAX) for pwm in self._packet.pwm[:OUTPUTS]]
 
-    def cpu(self) -> float:
-        """Return the CPU time [s] of the program, 0 if Lapwing has not started it."""
-        return self._program.cpu() if self._program else 0.0
-
     def close(self) -> None:
         """Close the connections and end the program."""
         if self._client:
@@ -174,19 +163,6 @@ class ArduPilotLink:
         if self._program:
             self._program.close()
         self._program = self._client = None
-
-    def _patience(self) -> Patience:
-        return Patience(self._setup.step_timeout, self._program.pid if self._program else None)
-
-    def _check(self, patience: Patience, problem: str, advice: str) -> None:
-        """Raise FirmwareError if the program has ended or the time-out has passed."""
-        at = f" at t = {self._time:.3f} s"
-        if self._program:
-            self._program.check(at)
-        if patience.over:
-            answered = self._socket.memory.sent_size[0] > 0
-            timeout = self._setup.step_timeout if answered else self._setup.start_timeout
-            raise FirmwareError(f"ardupilot: {problem} for {timeout:g} s{at}; {advice}")
 
     def _send(self) -> None:
         """Send the last answer."""
@@ -228,17 +204,6 @@ class ArduPilotLink:
 
 
 def _claim(setup: FirmwareSetup) -> socket.socket:
-    """Open the port of an instance.
-
-    Raises:
-        FirmwareError: the port is in use.
-    """
-    address = setup.host, setup.port_at(PORT, STRIDE)
-    result = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    try:
-        result.bind(address)
-    except OSError as error:
-        result.close()
-        message = f"ardupilot: cannot listen on udp {address[0]}:{address[1]} ({error.strerror})"
-        raise FirmwareError(f"{message}; end the other simulator, or set autopilot.instance") from None
-    return result
+    """Open the port of an instance. Raise FirmwareError if it is in use."""
+    advice = "end the other simulator, or set autopilot.instance"
+    return bound_socket(NAME, setup.host, setup.port_at(PORT, STRIDE), advice)

@@ -11,7 +11,6 @@ from lapwing.services.common import ports
 from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.firmware.mission import with_mission
-from lapwing.services.common.firmware.motor_order import Output
 from lapwing.services.common.firmware.schema import firmware_of
 from lapwing.services.common.firmware.setup import firmware_config, fleet
 from lapwing.services.common.mavlink.geo_coordinates import Datum
@@ -21,12 +20,6 @@ __all__ = ["fleet", "resolve"]
 NAME = "ardupilot"
 LOOP_RATE = 400  # [Hz] of ArduCopter's main loop, which the rate of the exchange must exceed
 SLOWEST = 10.0  # [Hz] at which ArduPilot's clock stops
-LAYOUT = (  # outputs 1 to 4 of FRAME_CLASS 1, FRAME_TYPE 1 (quadrotor in X)
-    Output(1.0, -1.0, "ccw"),
-    Output(-1.0, 1.0, "ccw"),
-    Output(1.0, 1.0, "cw"),
-    Output(-1.0, -1.0, "cw"),
-)
 
 
 class ArduPilotSetup(NamedTuple):
@@ -71,4 +64,4 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     inputs = [ports.TRUTH, *([ports.IMU] if imu else []), *([distance] if distance else [])]
     inputs += [ports.AIRSPEED] if own.airspeed else []
     inputs += [ports.GPS] if own.gps else []
-    return with_mission(scene, ArduPilot, firmware_config(scene, tuple(inputs), 1, LAYOUT, own))
+    return with_mission(scene, ArduPilot, firmware_config(scene, tuple(inputs), 1, own))

@@ -60,46 +60,61 @@ def start(p: Controller) -> ControllerState:
     )
 
 
+class StepStart(NamedTuple):
+    """Inputs of a controller's step, and state common to all controllers after a possible reset."""
+
+    estimate: StateEstimate
+    order: ControllerInput
+    setpoint: Setpoint
+    restarts: bool  # the controller is reset at this tick
+    failure_detector: motor_failure.State
+    still_from: int  # [tick]
+    charge: float
+
+
+@always_inline
+def start_step(p: Controller, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> StepStart:
+    """Read the inputs at `tick`; `s` is the state of a controller block."""
+    order, battery = inputs[1].value, inputs[2]
+    setpoint = inputs[3].value if order.follow else order.setpoint
+    restarts = order.restart_at == tick
+    detector, still_from = s.failure_detector, s.still_from
+    if restarts:
+        detector, still_from = motor_failure.start(p.failure_detector.value), tick + p.bounce
+    charge = battery.value.charge if battery.due else s.charge
+    return StepStart(inputs[0].value, order, setpoint, restarts, detector, still_from, charge)
+
+
 @always_inline
 def block_outputs(
-    p: Controller,
-    detector: motor_failure.State,
-    still_from: int,
-    battery_charge: float,
-    order: ControllerInput,
-    e: StateEstimate,
-    setpoint: Setpoint,
-    landed_state: int,
-    c: control.Command,
+    p: Controller, i: StepStart, landed_state: int, c: control.Command
 ) -> tuple[motor_failure.State, tuple[MotorCommand, Setpoint, AutopilotStatus, Flight]]:
     """Return the new state of the motor failure detector and the outputs of the block.
 
     Args:
         p: parameters of the block.
-        detector: state of the motor failure detector.
-        still_from: [tick].
-        battery_charge: fraction.
-        order: input from the commander.
-        e: state estimate.
-        setpoint: setpoint in use.
+        i: start of the step.
         landed_state: ON_GROUND, FLYING or LANDED.
         c: output of the control law.
     """
-    height = e.position_world[2] - p.law.value.resting_height
-    detector = motor_failure.step(p.failure_detector.value, detector, p.interval, e, height, c.thrust)
+    order, setpoint = i.order, i.setpoint
+    height = i.estimate.position_world[2] - p.law.value.resting_height
+    detector = motor_failure.step(
+        p.failure_detector.value, i.failure_detector, p.interval, i.estimate, height, c.thrust
+    )
     flying = landed_state == FLYING
     armed = flying if order.follow else order.armed
     finished = (c.finished and setpoint.final) if order.follow else order.finished
     released = order.released or (order.follow and setpoint.release and not flying)
     attitude_reference = (c.roll_reference, c.pitch_reference, c.yaw_reference)
-    warning = battery_warning(p.thresholds.value, battery_charge)
+    warning = battery_warning(p.thresholds.value, i.charge)
     return detector, (
         MotorCommand(c.motor_voltage, flying, c.thrust, attitude_reference),
         setpoint,
         AutopilotStatus(
             setpoint.phase, order.status_text_id, armed, not flying, finished, warning, detector.failed, released
         ),
-        Flight(landed_state, still_from, detector.failed),
+        Flight(landed_state, i.still_from, detector.failed),
     )
 
 
@@ -108,16 +123,9 @@ def step(
     p: Controller, s: ControllerState, tick: int, inputs: tuple[InputSample, ...]
 ) -> tuple[ControllerState, tuple, int]:
     """Compute the motor command at `tick`."""
-    e, order, battery = inputs[0].value, inputs[1].value, inputs[2]
-    setpoint = inputs[3].value if order.follow else order.setpoint
-    control_state, detector, still_from = s.control, s.failure_detector, s.still_from
-    if order.restart_at == tick:
-        control_state, still_from = control.START, tick + p.bounce
-        detector = motor_failure.start(p.failure_detector.value)
-    charge = battery.value.charge if battery.due else s.charge
-    failed = detector.failed
-    control_state, c = control.step(p.law.value, control_state, p.interval, e, setpoint, failed)
-    detector, outputs = block_outputs(
-        p, detector, still_from, charge, order, e, setpoint, control_state.landed_state.name, c
-    )
-    return ControllerState(control_state, detector, still_from, charge), outputs, CONTINUE
+    i = start_step(p, s, tick, inputs)
+    control_state = control.START if i.restarts else s.control
+    failed = i.failure_detector.failed
+    control_state, c = control.step(p.law.value, control_state, p.interval, i.estimate, i.setpoint, failed)
+    detector, outputs = block_outputs(p, i, control_state.landed_state.name, c)
+    return ControllerState(control_state, detector, i.still_from, i.charge), outputs, CONTINUE

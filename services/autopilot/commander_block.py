@@ -93,7 +93,7 @@ class CommanderBlock:
         hover_thrust = self._weight / (lift(a) * thrust_max)
         constants = Constants(
             table, a.resting_height, a.gravity, hover_thrust, bool(config.phases), config.operator, injection.units,
-            len(a.rotor_x), config.imus,
+            len(a.rotor_x), config.imus, config.has_gps,
         )  # fmt: skip
         self._commander = Commander(constants)
         self._injection = injection

@@ -13,9 +13,8 @@ from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import quaternion_columns, stamp_columns
 from lapwing.services.autopilot.estimator import NAMES
 from lapwing.services.common import ports
-from lapwing.services.common.command_encoder import actuators_encoder, status_encoder
+from lapwing.services.common.encoders import actuators_encoder, setpoint_encoder, status_encoder
 from lapwing.services.common.ports import StateEstimate
-from lapwing.services.common.setpoint_encoder import setpoint_encoder
 
 
 def wires(

@@ -138,10 +138,7 @@ def step(p: Parameters, s: State, dt: float, e: StateEstimate, height: float, co
         return State(commanded, root, (wx, wy), (0.0, 0.0), 0, 0.0, before, pause)
     ex, ey = wx - s.rate[0], wy - s.rate[1]
     gain = 2.0 * BANDWIDTH
-    rate = (
-        s.rate[0] + dt * (ax + s.disturbance[0] + gain * ex),
-        s.rate[1] + dt * (ay + s.disturbance[1] + gain * ey),
-    )
+    rate = (s.rate[0] + dt * (ax + s.disturbance[0] + gain * ex), s.rate[1] + dt * (ay + s.disturbance[1] + gain * ey))
     square = BANDWIDTH * BANDWIDTH * dt
     disturbance = (s.disturbance[0] + square * ex, s.disturbance[1] + square * ey)
     suspected = suspect(p, root, disturbance)

@@ -58,9 +58,7 @@ def create(setup: RunConfig, operator: Operator = lambda tick: ()) -> Service:
         return [*(config.plan if tick == 0 else ()), *operator(tick)]
 
     sound, motors = (SOUND,) * config.imus, (SOUND,) * len(config.airframe.rotor_x)
-    no_faults = with_satellites(
-        Faults(gyro=sound, accelerometer=sound, motors=motors), values, values.get("SYS_HAS_GPS", 1.0) != 0.0
-    )
+    no_faults = with_satellites(Faults(gyro=sound, accelerometer=sound, motors=motors), values, config.has_gps)
     faults = Cell(no_faults) if config.operator else None
     sensor_ports = () if config.own_estimator else [i.port for i in setup.services[NAME].inputs]
     injection = Injection(faults, setup, sensor_ports, config.airframe.motor)

@@ -39,3 +39,8 @@ class AutopilotSetup(NamedTuple):
     vehicle: VehicleModel | None = None  # vehicle parameters for user code
     imus: int = 1  # units that the autopilot votes on
     distance_sensor: str | None = None  # port of the sensor of the distance to the ground
+
+    @property
+    def has_gps(self) -> bool:
+        """True unless SYS_HAS_GPS is 0 at the start."""
+        return all(p.default != 0.0 for p in self.parameters if p.name == "SYS_HAS_GPS")  # absent from former logs

@@ -4,12 +4,12 @@ import socket
 import time
 from collections.abc import Callable
 
+from lapwing.cosim.processes.patience import Patience
 from lapwing.services.betaflight import msp
 from lapwing.services.betaflight.msp import FirmwareStatus, Msp
 from lapwing.services.betaflight.packets import Ports
 from lapwing.services.betaflight.resolve import PilotSetup
 from lapwing.services.common.firmware.link import FirmwareError, Waits
-from lapwing.services.common.firmware.patience import Patience
 from lapwing.services.common.firmware.program import Program
 from lapwing.services.common.firmware.setup import FirmwareSetup
 

@@ -6,22 +6,21 @@ machine varies by a factor of 100. All packets therefore carry the same time, so
 ones: a simulation that catches up would be faster than the firmware.
 """
 
-import math
 import socket
 import time
 from contextlib import suppress
 
+from lapwing.kernels import math
 from lapwing.services.betaflight import boot, msp
 from lapwing.services.betaflight.clock import slow_down
-from lapwing.services.betaflight.pace import Pace
 from lapwing.services.betaflight.packets import Ports, parse_motors, rc_packet, state_packet
 from lapwing.services.betaflight.pilot import OFF, Pilot, Sticks
-from lapwing.services.betaflight.resolve import PilotSetup
+from lapwing.services.betaflight.resolve import NAME, PilotSetup
 from lapwing.services.betaflight.state_source import StateSource
 from lapwing.services.common import ports
-from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, LinkReport, Read, Waits
-from lapwing.services.common.firmware.patience import Patience
-from lapwing.services.common.firmware.program import Program
+from lapwing.services.common.firmware.datagrams import bound_socket
+from lapwing.services.common.firmware.link import FirmwareOutput, LinkReport, Read, Waits
+from lapwing.services.common.firmware.program import ProgramLink
 from lapwing.services.common.firmware.setup import FirmwareSetup
 
 TIME = 1.0  # [s] in all packets, unless the clock is slowed down
@@ -33,7 +32,43 @@ REPLY = 0.05  # [s] longest wait for motor outputs before the state is sent agai
 PEER_TIMEOUT = 1.0  # [s] of silence after which another firmware may take over
 
 
-class BetaflightLink:
+LATE = 1.0  # intervals after its time at which a packet counts as late
+FASTEST = 0.8  # shortest fraction of an interval between two packets
+
+
+class Pace:
+    """Pacing of packets in wall time, with statistics of its accuracy."""
+
+    def __init__(self, report: LinkReport) -> None:
+        """Store the report."""
+        self._report = report
+        self._next = self._sent = 0.0  # [s] of the wall clock
+        self._count = self._sum = self._squares = 0.0  # of the times [s] between packets
+
+    def wait(self, interval: float, rate: float) -> None:
+        """Wait until `interval` [s] after the last packet; `rate`: simulation time per wall time."""
+        now, report = time.monotonic(), self._report
+        if self._sent == 0.0:
+            self._next = now
+        if now < self._next:
+            time.sleep(self._next - now)
+            now = time.monotonic()
+        if now - self._next > LATE * interval:
+            report.late += 1
+        report.skew_max = max(report.skew_max, rate * (now - self._next))
+        if self._sent > 0.0:
+            self._add(now - self._sent)
+        self._sent = now
+        self._next = max(self._next + interval, now + FASTEST * interval)
+
+    def _add(self, gap: float) -> None:
+        """Add a time [s] between two packets to the statistics."""
+        self._count, self._sum, self._squares = self._count + 1, self._sum + gap, self._squares + gap * gap
+        mean = self._sum / self._count
+        self._report.jitter = math.sqrt(max(0.0, self._squares / self._count - mean * mean))
+
+
+class BetaflightLink(ProgramLink):
     """Connection to one Betaflight SITL."""
 
     def __init__(self, setup: FirmwareSetup) -> None:
@@ -42,7 +77,6 @@ class BetaflightLink:
         pilot: PilotSetup = setup.own
         self.report = LinkReport("betaflight", reproducible=False)
         self._source, self._pilot = StateSource(pilot, setup.start_world), Pilot(pilot, setup.start_world)
-        self._program: Program | None = None
         self._msp: msp.Msp | None = None
         self._socket: socket.socket | None = None
         self._status = msp.FirmwareStatus(False, (), 0.0)
@@ -60,7 +94,8 @@ class BetaflightLink:
     def open(self, waits: Waits) -> None:
         """Start the firmware or wait for it, and calibrate it."""
         setup = self._setup
-        self._socket = _open_socket(setup.host, self._ports.motors)
+        advice = "end the other simulator that uses it"
+        self._socket = bound_socket(NAME, setup.host, self._ports.motors, advice)
         self._program = boot.start(setup, waits)
         self._calibrate(waits)
         if self._clock_rate < 1.0:
@@ -106,7 +141,7 @@ class BetaflightLink:
     def step(self, tick: int, read: Read, waits: Waits) -> FirmwareOutput:
         """Send state and sticks at the time of the tick, and return the newest motor outputs."""
         interval = self._setup.interval
-        t = tick * interval
+        t = self._time = tick * interval
         motion = self._source.update(t, read)
         self._sticks = self._pilot.step(t, interval, read(ports.TRAJECTORY), motion)
         self._pace.wait(interval / self._rate, self._rate)
@@ -119,14 +154,10 @@ class BetaflightLink:
         start = time.monotonic()
         if not self._drain(REPLY):
             self.report.missed += 1
-            self._repeat(t, waits)
+            self._repeat(waits)
         self.report.waiting += time.monotonic() - start
         self._poll_status(t)
         return self._output()
-
-    def cpu(self) -> float:
-        """Return the CPU time [s] of the program, 0 if Lapwing has not started it."""
-        return self._program.cpu() if self._program else 0.0
 
     def close(self) -> None:
         """Close the connections and end the program."""
@@ -178,20 +209,16 @@ class BetaflightLink:
         self._sender, self._output_at = sender, now
         return True
 
-    def _repeat(self, t: float, waits: Waits) -> None:
+    def _repeat(self, waits: Waits) -> None:
         """Send the state again until motor outputs arrive: the simulation pauses while the firmware gets no CPU.
 
         Raises:
             FirmwareError: the firmware has been silent for too long, or has ended.
         """
-        patience = Patience(self._setup.step_timeout, self._program.pid if self._program else None)
+        patience = self._patience(self._setup.step_timeout)
         while True:
             waits("Betaflight's motor outputs")
-            if self._program:
-                self._program.check(f" at t = {t:.3f} s")
-            if patience.over:
-                message = f"betaflight: no motor outputs for {self._setup.step_timeout:g} s at t = {t:.3f} s"
-                raise FirmwareError(f"{message}; the firmware has stalled or ended")
+            self._check(patience, "no motor outputs", "the firmware has stalled or ended")
             self.report.resent += 1
             self._send(self._sticks)
             if self._drain(REPLY):
@@ -220,19 +247,3 @@ class BetaflightLink:
         return FirmwareOutput(
             self._outputs, armed, landed, finished, f"angle ({stage})", text, blockers, self._pilot.attitude_reference
         )
-
-
-def _open_socket(host: str, port: int) -> socket.socket:
-    """Open the socket of the motor outputs.
-
-    Raises:
-        FirmwareError: the port is in use.
-    """
-    result = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-    try:
-        result.bind((host, port))
-    except OSError as error:
-        result.close()
-        message = f"betaflight: UDP port {port} of {host} cannot be opened ({error.strerror})"
-        raise FirmwareError(f"{message}; end the other simulator that uses it") from None
-    return result

@@ -12,19 +12,12 @@ from lapwing.services.betaflight.schema import Betaflight
 from lapwing.services.common import ports
 from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.environment_schema import environment
-from lapwing.services.common.firmware.motor_order import Output
 from lapwing.services.common.firmware.schema import firmware_of
 from lapwing.services.common.firmware.setup import firmware_config
 from lapwing.services.common.vehicle_schema import airframe, gravity, thrust_coefficient
 
 NAME = "betaflight"
 SLOWEST = 50  # [Hz] at which the firmware does not measure its clock's rate
-LAYOUT = (  # of port 9002, which differs from the firmware's numbering of motors; propellers turn inwards
-    Output(1.0, -1.0, "ccw"),
-    Output(-1.0, 1.0, "ccw"),
-    Output(1.0, 1.0, "cw"),
-    Output(-1.0, -1.0, "cw"),
-)
 
 
 class PilotSetup(NamedTuple):
@@ -69,7 +62,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         home=environment(scene).home,
     )
     sensors = [name for name in (ports.IMU, ports.GPS, ports.BAROMETER) if name in sensor_names]
-    return firmware_config(scene, (ports.TRUTH, *sensors), 1, LAYOUT, pilot)
+    return firmware_config(scene, (ports.TRUTH, *sensors), 1, pilot)
 
 
 def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[str, ServiceConfig]:

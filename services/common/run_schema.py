@@ -13,7 +13,6 @@ SHIPPED = Path(str(importlib.resources.files(lapwing.scenes)))  # folder of the 
 Triple = Annotated[tuple[float, float, float], Field(strict=False)]  # along x, y, z; TOML gives a list
 
 Pair = Annotated[tuple[float, float], Field(strict=False)]  # along x and y
-Names = Annotated[tuple[str, ...], Field(strict=False)]
 
 
 class Run(SceneTable):

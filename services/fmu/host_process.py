@@ -15,7 +15,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from lapwing.services.common.firmware.patience import Patience
+from lapwing.cosim.processes.patience import Patience
 from lapwing.services.fmu.service_config import FmuConfig
 
 STARTUP = 300.0  # [s] limit to load, compile and initialise the FMU

@@ -91,9 +91,8 @@ class Adapter:
             put: sends bytes to it.
             strict: True to ignore it if its first bytes are not MAVLink.
         """
-        channel = Channel(self.vehicle.system, self.signature, datagrams, self.counts, strict)
+        channel = Channel(self.vehicle.address, self.signature, datagrams, self.counts, strict)
         endpoint = Endpoint(channel, local, put)
-        endpoint.set_source(self.vehicle.system, self.vehicle.component)
         self.sessions[endpoint] = self._session(endpoint)
         return endpoint
 
@@ -142,7 +141,7 @@ class Adapter:
         return valid
 
     def _dispatch(self, endpoint: Endpoint, m: Any) -> None:
-        address = self.vehicle.system, self.vehicle.component
+        address = self.vehicle.address
         source = m.get_srcSystem(), m.get_srcComponent()
         target = getattr(m, "target_system", getattr(m, "target", ALL))
         component = getattr(m, "target_component", ALL)
@@ -217,11 +216,11 @@ class Adapter:
         self._restart_requested = False
         system, component = (self.parameters.value(name) for name in (SYSTEM_ID, COMPONENT_ID))
         if not math.isnan(system):  # ArduPilot's are named differently
-            self.vehicle.system, self.vehicle.component = int(system), int(component)
+            self.vehicle.address = int(system), int(component)
             if self.signature:
-                self.signature.set_system(self.vehicle.system)
+                self.signature.set_system(int(system))
         for endpoint in self.sessions:
-            endpoint.set_source(self.vehicle.system, self.vehicle.component)
+            endpoint.set_source(self.vehicle.address)
             self.parameters.forget(endpoint)
             self.missions.forget(endpoint)
             self.sessions[endpoint] = self._session(endpoint)

@@ -35,18 +35,23 @@ class Channel:
     """Frames of one endpoint."""
 
     def __init__(
-        self, system: int, signature: Signature | None, datagrams: bool, counts: Counter[str], strict: bool = False
+        self,
+        source: tuple[int, int],
+        signature: Signature | None,
+        datagrams: bool,
+        counts: Counter[str],
+        strict: bool = False,
     ):
         """Create the channel.
 
         Args:
-            system: system id of the vehicle, which sends as its autopilot, component 1, until `set_source`.
+            source: system and component id of the vehicle, until `set_source`.
             signature: signs and checks frames; None for no signing.
             datagrams: True if no frame continues from one piece of bytes to the next.
             counts: rejected messages by reason.
             strict: True to ignore an endpoint whose first bytes are not a frame.
         """
-        self._codec = _Codec(None, system, mavlink.MAV_COMP_ID_AUTOPILOT1)
+        self._codec = _Codec(None, *source)
         self._codec.robust_parsing = True
         self._signature = signature
         if signature:
@@ -55,9 +60,9 @@ class Channel:
         self._framed = not strict  # a frame was received, signed or not
         self.foreign = False  # the first bytes were not a frame
 
-    def set_source(self, system: int, component: int) -> None:
-        """Set the source of further frames."""
-        self._codec.srcSystem, self._codec.srcComponent = system, component
+    def set_source(self, source: tuple[int, int]) -> None:
+        """Set system and component id of the vehicle in further frames."""
+        self._codec.srcSystem, self._codec.srcComponent = source
 
     def encode(self, message: Any) -> bytes:
         """Return the next frame of a message or `Numbers`. Return no bytes, and count it, if a value does not fit."""

@@ -39,9 +39,9 @@ class Endpoint:
         """Yield the valid messages in received bytes."""
         return self._channel.decode(data)
 
-    def set_source(self, system: int, component: int) -> None:
-        """Set the source of further messages to it."""
-        self._channel.set_source(system, component)
+    def set_source(self, source: tuple[int, int]) -> None:
+        """Set system and component id of the vehicle in further messages."""
+        self._channel.set_source(source)
 
     def send(self, *messages: Any) -> None:
         """Send messages, several in a datagram as far as they fit."""

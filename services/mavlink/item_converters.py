@@ -135,10 +135,7 @@ def _circle(m: Any, datum: Datum) -> Any:
     )
 
 
-@converts(
-    mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION,
-    mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION,
-)
+@converts(mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_INCLUSION, mavlink.MAV_CMD_NAV_FENCE_POLYGON_VERTEX_EXCLUSION)
 def _vertex(m: Any, datum: Datum) -> Any:
     if not 3.0 <= m.param1 <= MAX_ITEMS:
         raise RejectedItemError(mavlink.MAV_MISSION_INVALID_PARAM1, m.seq)

@@ -34,12 +34,7 @@ class MissionStore:
     """Stored items of each kind, and active uploads."""
 
     def __init__(
-        self,
-        clock: Clock,
-        commands: CommandQueue,
-        datum: Callable[[], Datum],
-        home_first: bool,
-        counts: Counter[str],
+        self, clock: Clock, commands: CommandQueue, datum: Callable[[], Datum], home_first: bool, counts: Counter[str]
     ):
         """Create an empty store.
 

@@ -14,7 +14,6 @@ from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.mavlink import firmware
 from lapwing.services.mavlink.event_log import EventLog
 from lapwing.services.mavlink.fast_conversions import angles, geodetic
-from lapwing.services.mavlink.flight_times import FlightTimes
 from lapwing.services.mavlink.vehicle_description import VehicleDescription
 
 _MOTION_END = 18  # values of a header and a motion: encapsulation, time (2), frame (2), pose (7), velocities (6)
@@ -57,6 +56,26 @@ class NedMotion:
         self.geodetic: Vec3 = geodetic(home, self.position_world)
 
 
+class FlightTimes:
+    """Simulation times [ns] of arming, take-off and landing of the last flight; 0: not yet."""
+
+    def __init__(self) -> None:
+        self.armed_ns = self.takeoff_ns = self.landing_ns = 0
+        self.number = 0  # number of flights, including the current one
+        self._before = Status(landed=True)
+
+    def update(self, status: Status, time_ns: int) -> None:
+        """Update with a newer status of the autopilot and its simulation time [ns]."""
+        before, self._before = self._before, status
+        if status.armed and not before.armed:
+            self.armed_ns, self.takeoff_ns, self.landing_ns = time_ns, 0, 0
+            self.number += 1
+        if before.landed and not status.landed:
+            self.takeoff_ns, self.landing_ns = time_ns, 0
+        if status.landed and not before.landed:
+            self.landing_ns = time_ns
+
+
 class VehicleCache:
     """Vehicle for its links: description, simulation time, and the newest message of each topic."""
 
@@ -64,7 +83,7 @@ class VehicleCache:
         """Create the cache of a vehicle that has published nothing yet."""
         self.description = description
         self.firmware = firmware.get(description.firmware)
-        self.system, self.component = description.system_id, mavlink.MAV_COMP_ID_AUTOPILOT1  # present address
+        self.address = description.system_id, mavlink.MAV_COMP_ID_AUTOPILOT1  # present system and component id
         self.time_ns = 0
         self.flight = FlightTimes()
         self.events = EventLog()

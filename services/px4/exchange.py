@@ -4,15 +4,7 @@ from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, NON_FINITE
 from lapwing.kernels import always_inline, math
-from lapwing.services.common.firmware.exchange import (
-    SEND,
-    WAIT,
-    Shared,
-    begin,
-    call_python,
-    end,
-    publish,
-)
+from lapwing.services.common.firmware.exchange import SEND, WAIT, Shared, begin, call_python, end, publish
 from lapwing.services.px4.messages import ARMED, LOCK_STEP
 from lapwing.services.px4.sample import Readings, has_rare, sensors
 from lapwing.services.px4.sensor_frame import Payload, read_controls, write_sensors

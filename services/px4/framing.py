@@ -18,12 +18,12 @@ _CHECKSUM = struct.Struct("<H")
 _REVERSED = bytes(int(f"{byte:08b}"[::-1], 2) for byte in range(256))  # each byte with its bits in reverse
 
 
-def checksum(data: bytes) -> int:
+def checksum(data: bytes, start: int = 0xFFFF) -> int:
     """Return the checksum (CRC-16/MCRF4XX) of a frame's content and its CRC_EXTRA.
 
     It is the CRC of `binascii.crc_hqx` with the bits of every byte, and of the result, in reverse.
     """
-    crc = crc_hqx(data.translate(_REVERSED), 0xFFFF)
+    crc = crc_hqx(data.translate(_REVERSED), start)
     return _REVERSED[crc & 0xFF] << 8 | _REVERSED[crc >> 8]
 
 

@@ -12,11 +12,11 @@ from collections.abc import Callable
 import numpy as np
 
 from lapwing.cosim.diagram.compiled_block import InputRing
+from lapwing.cosim.processes.patience import Patience
 from lapwing.services.common import ports
 from lapwing.services.common.firmware.exchange import POLL, SEND, Shared, empty_ring
 from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, LinkReport, Read, Waits
-from lapwing.services.common.firmware.patience import Patience
-from lapwing.services.common.firmware.program import Program
+from lapwing.services.common.firmware.program import Program, ProgramLink
 from lapwing.services.common.firmware.setup import FirmwareSetup, first_free
 from lapwing.services.common.ports import AirspeedReading
 from lapwing.services.px4.connection import Connection, claim
@@ -34,7 +34,7 @@ ANSWER_TIMEOUT = 1.0  # [s] after which a step continues without the answer of P
 OTHERS_EVERY = 1.0  # [s] between two checks for a second firmware
 
 
-class Px4Link:
+class Px4Link(ProgramLink):
     """Connection to one PX4 SITL."""
 
     outputs = OUTPUTS
@@ -45,12 +45,10 @@ class Px4Link:
         self._own: Px4Setup = setup.own
         self.report = LinkReport("px4")
         self._stream = stream()
-        self._program: Program | None = None
         self._connection: Connection | None = None
         self._vehicle: VehicleLink | None = None
         self._epoch = np.zeros(1, np.int64)  # [us] of PX4's clock at tick 0
         self._last_us = 0  # [us] of the last message
-        self._time = 0.0  # [s] simulation time
         self._step_us = setup.period * setup.interval_ns // 1000
         self._others_at = 0.0  # [s] of the next check for a second firmware
         self._silent = np.zeros(1, np.int64)  # consecutive steps without an answer
@@ -155,10 +153,6 @@ class Px4Link:
         self._shared.next_poll[0] = max(tick + 1, math.floor(self._vehicle.next_poll / self._setup.interval))
         return result
 
-    def cpu(self) -> float:
-        """Return the CPU time [s] of the program, 0 if Lapwing has not started it."""
-        return self._program.cpu() if self._program else 0.0
-
     def close(self) -> None:
         """Close the connections and end the program."""
         if self._vehicle:
@@ -227,19 +221,3 @@ class Px4Link:
                 self.report.missed += 1
                 self.report.note(f"non-finite outputs at t = {self._time:.3f} s; the last ones are kept")
         return result
-
-    def _patience(self, timeout: float) -> Patience:
-        return Patience(timeout, self._program.pid if self._program else None)
-
-    def _check_program(self) -> None:
-        if self._program:
-            self._program.check(f" at t = {self._time:.3f} s")
-
-    def _check(self, patience: Patience, problem: str, advice: str) -> None:
-        """Raise FirmwareError if the program has ended or the time-out has passed."""
-        self._check_program()
-        if patience.over:
-            self._fail(f"{problem} for {self._setup.start_timeout:g} s", advice)
-
-    def _fail(self, problem: str, advice: str) -> None:
-        raise FirmwareError(f"px4: {problem} at t = {self._time:.3f} s; {advice}")

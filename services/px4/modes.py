@@ -1,9 +1,56 @@
-"""Flight modes of PX4, and its conventions on MAVLink."""
+"""Flight modes of PX4, its conventions on MAVLink, and the texts of its failsafe events.
+
+MAVLink EVENT has cause and action of a failsafe, status texts do not. Sources: PX4,
+src/modules/commander/failsafe/framework.cpp and src/lib/events/enums.json; MAVLink guide, "Events Interface".
+"""
 
 import math
+import struct
 
 from lapwing.services.common.firmware.conventions import Conventions
-from lapwing.services.px4.failsafe_events import failsafe_text
+
+AUTOPILOT = 1  # component of an event, in the highest byte of its id
+ACTIONS = (
+    "none", "warning", "position mode", "altitude mode", "stabilized mode", "hold", "return", "land", "descend",
+    "disarm", "termination",
+)  # fmt: skip
+CAUSES = (
+    "", "loss of manual control", "loss of the ground station", "low battery", "critical battery",
+    "emergency battery", "low remaining flight time",
+)  # fmt: skip
+
+
+def event_id(name: str) -> int:
+    """Return the id of an event: component, and the lower 24 bits of the FNV-1a hash of its name."""
+    result = 0x811C9DC5
+    for byte in name.encode():
+        result = (result ^ byte) * 0x01000193 & 0xFFFFFFFF
+    return AUTOPILOT << 24 | result & 0xFFFFFF
+
+
+_LAYOUTS = {  # mode, action, delay [s], cause
+    event_id("commander_failsafe_enter_generic_hold"): ("<4xBH", ("action", "delay")),
+    event_id("commander_failsafe_enter_hold"): ("<4xBHB", ("action", "delay", "cause")),
+    event_id("commander_failsafe_enter_autopilot_disengaged"): ("<4xB", ("action",)),
+    event_id("commander_failsafe_enter_generic"): ("<4xB", ("action",)),
+    event_id("commander_failsafe_enter"): ("<4xBB", ("action", "cause")),
+}
+
+
+def failsafe_text(number: int, arguments: bytes) -> str:
+    """Return cause (if known) and action of the failsafe in an event, "" for other events."""
+    if number not in _LAYOUTS:
+        return ""
+    layout, names = _LAYOUTS[number]
+    values = dict(zip(names, struct.unpack_from(layout, arguments), strict=True))
+    parts = [_name(CAUSES, values.get("cause", 0)), _name(ACTIONS, values["action"])]
+    result = ": ".join(filter(None, parts))
+    return f"{result} in {values['delay']} s" if "delay" in values else result
+
+
+def _name(names: tuple[str, ...], number: int) -> str:
+    return names[number] if number < len(names) else str(number)
+
 
 MAIN = {
     1: "manual", 2: "altitude control", 3: "position control", 4: "auto", 5: "acro", 6: "offboard", 7: "stabilized",
@@ -24,10 +71,5 @@ def mode_name(custom_mode: int) -> str:
 
 
 CONVENTIONS = Conventions(
-    (AUTO, MISSION),
-    home_first=False,
-    open_value=math.nan,
-    bytewise=True,
-    mode_name=mode_name,
-    event_text=failsafe_text,
+    (AUTO, MISSION), home_first=False, open_value=math.nan, bytewise=True, mode_name=mode_name, event_text=failsafe_text
 )

@@ -13,7 +13,6 @@ from lapwing.services.common import ports
 from lapwing.services.common.communication_schema import ticks
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.firmware.mission import with_mission
-from lapwing.services.common.firmware.motor_order import Output
 from lapwing.services.common.firmware.schema import firmware_of
 from lapwing.services.common.firmware.setup import firmware_config, fleet
 from lapwing.services.common.mavlink.geo_coordinates import Datum
@@ -25,12 +24,6 @@ NAME = "px4"
 REQUIRED = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.GPS)
 BATTERIES = ("battery", "battery_thevenin")  # effects that model the charge
 OPTIONAL = (ports.AIRSPEED, ports.RANGEFINDER, ports.SONAR)
-LAYOUT = (  # motors 1 to 4 of airframe 10016 (none_iris)
-    Output(1.0, -1.0, "ccw"),
-    Output(-1.0, 1.0, "ccw"),
-    Output(1.0, 1.0, "cw"),
-    Output(-1.0, -1.0, "cw"),
-)
 _rotate_back = python_function(quaternion.rotate_back)
 _pressure = python_function(atmosphere.pressure)
 
@@ -69,4 +62,4 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         _pressure(here.atmosphere, here.home.height + position[2]),
         any(name in scene.tables("effects") for name in BATTERIES),
     )
-    return with_mission(scene, Px4, firmware_config(scene, tuple(sensors), periods[ports.IMU], LAYOUT, own))
+    return with_mission(scene, Px4, firmware_config(scene, tuple(sensors), periods[ports.IMU], own))

@@ -10,7 +10,7 @@ import numpy as np
 
 from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import always_inline, kernel, math
-from lapwing.services.px4.framing import V2
+from lapwing.services.px4.framing import V2, checksum
 from lapwing.services.px4.messages import (
     ACCELEROMETER,
     AIRSPEED,
@@ -28,20 +28,7 @@ _HEAD, _MASK, _END = 10, 60, 65  # [bytes] size of a header; offset of fields_up
 _CONTROLS_END = HIL_ACTUATOR_CONTROLS.fields.size
 _SENSOR, _SENSOR_EXTRA = HIL_SENSOR.number, HIL_SENSOR.extra
 _CONTROLS, _CONTROLS_EXTRA = HIL_ACTUATOR_CONTROLS.number, HIL_ACTUATOR_CONTROLS.extra
-
-
-def _crc_table() -> np.ndarray:
-    """Return the checksum's change by each byte, CRC-16/MCRF4XX."""
-    result = []
-    for byte in range(256):
-        crc = byte
-        for _ in range(8):
-            crc = crc >> 1 ^ 0x8408 if crc & 1 else crc >> 1
-        result.append(crc)
-    return np.array(result, np.int64)
-
-
-_CRC = _crc_table()
+_CRC = np.array([checksum(bytes([byte]), 0) for byte in range(256)], np.int64)  # change of the checksum by each byte
 
 
 class Payload(NamedTuple):

@@ -6,8 +6,8 @@ import socket
 import time
 from collections import deque
 
+from lapwing.cosim.processes.patience import Patience
 from lapwing.services.common.firmware.link import FirmwareError, LinkReport, Waits
-from lapwing.services.common.firmware.patience import Patience
 from lapwing.services.px4.framing import FrameParser, Layout, frame
 from lapwing.services.px4.messages import ARMED, DISTANCE_SENSOR, HEARTBEAT, HIL_ACTUATOR_CONTROLS, HIL_GPS, HIL_SENSOR
 from lapwing.services.px4.messages import LOCK_STEP as LOCK_STEP_FLAG

@@ -2,7 +2,7 @@
 
 from lapwing.kernels import math
 from lapwing.services.common import ports
-from lapwing.services.common.firmware.flight_status import FlightStatus
+from lapwing.services.common.firmware.flight_status import poll_flight
 from lapwing.services.common.firmware.link import FirmwareOutput, Read
 from lapwing.services.common.firmware.mavlink_transport import UdpTransport
 from lapwing.services.common.firmware.mission import mission_items, mission_messages
@@ -20,7 +20,6 @@ class VehicleLink:
         """Create the client of a PX4 that has not sent anything yet."""
         items, parameters = mission_items(setup.plan), {} if setup.command else dict(setup.parameters)
         self._client = MissionClient(transport, CONVENTIONS, mission_messages(items, setup.own.datum), parameters)
-        self._status = FlightStatus("px4", self._client)
         self._battery, self._battery_at = setup.own.battery, 0.0  # [s] of the next message
 
     @property
@@ -31,17 +30,17 @@ class VehicleLink:
     @property
     def version(self) -> str:
         """Version of the firmware, "" if it is not known."""
-        return self._status.version
+        return self._client.version
 
     def poll(self, time: float, read: Read) -> FirmwareOutput:
         """Poll at simulation `time` [s], and send the battery. Return the state of the flight, without outputs."""
-        self._status.poll(time)
+        result = poll_flight("px4", self._client, time)
         if self._battery and time >= self._battery_at:
             self._battery_at = time + BATTERY_EVERY
             battery = read(ports.BATTERY)
             if math.isfinite(battery.charge):
                 self._client.send_battery(battery.voltage, battery.current, battery.charge)
-        return self._status.output((), running=False)
+        return result
 
     def restart(self) -> None:
         """Start over after a restart of PX4: upload the mission, and arm."""

@@ -15,14 +15,7 @@ from lapwing.cosim.log import LogWriter
 from lapwing.cosim.log.log_sequencer import Recording
 from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.cosim.run_errors import LockStepError
-from lapwing.cosim.transport.bus_keys import (
-    BATCH_KEY,
-    DEADLINES_KEY,
-    DIVERGED_KEY,
-    ENDED_KEY,
-    LOGGED_KEY,
-    REPORTS_KEY,
-)
+from lapwing.cosim.transport.bus_keys import BATCH_KEY, DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY, LOGGED_KEY, REPORTS_KEY
 from lapwing.cosim.transport.packets import unpack_log_packet
 
 REPORTED_WAIT = 1.0  # [s] of waiting for the disk above which the log's metadata reports it

@@ -8,7 +8,7 @@ from lapwing.cosim.diagram.compiled_block import Block
 from lapwing.kernels.cell import Cell
 from lapwing.messages.topics import TRAJECTORY
 from lapwing.services.common import ports
-from lapwing.services.common.setpoint_encoder import setpoint_encoder
+from lapwing.services.common.encoders import setpoint_encoder
 from lapwing.services.trajectory.block import TrajectoryPath
 from lapwing.services.trajectory.leader_follower import FollowedPath
 

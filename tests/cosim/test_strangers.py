@@ -14,8 +14,9 @@ from lapwing.cosim.access.private_sockets import private_endpoints
 from lapwing.cosim.access.publisher_ids import PublisherIds, new_secret
 from lapwing.cosim.config.serialise import to_json
 from lapwing.cosim.log import LogReader
-from lapwing.cosim.transport.bus import ZenohBus, mesh
+from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import ALIVE_KEY, BATCH_KEY, DIVERGED_KEY, ENDED_KEY, SETUP_KEY, STEP_KEY
+from lapwing.cosim.transport.session_settings import mesh
 from lapwing.messages.attachment import pack
 from lapwing.services.common.operator_inbox import OPERATOR_KEY
 from lapwing.services.scene_resolver import load, resolve

@@ -172,5 +172,5 @@ def test_plot_is_figure_and_file(tmp_path):
     figure = flight.plot(tmp_path / "flight.png")
     assert len(figure.axes) == 4
     assert (tmp_path / "flight.png").stat().st_size > 10_000
-    with pytest.raises(ValueError, match=r"none/flight.png: cannot be written: No such file"):
+    with pytest.raises(ValueError, match=r"none/flight.png: cannot be written: no such file"):
         flight.plot(tmp_path / "none" / "flight.png")

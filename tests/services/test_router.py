@@ -11,8 +11,9 @@ import zenoh
 from lapwing.cosim.access.certificates import make, tls
 from lapwing.cosim.access.zenoh_access import VIEWER
 from lapwing.cosim.run_errors import BusError
-from lapwing.cosim.transport.bus import ZenohBus, mesh
+from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import BATCH_KEY, DIVERGED_KEY, STEP_KEY
+from lapwing.cosim.transport.session_settings import mesh
 from lapwing.messages import PoseStamped
 from lapwing.services.common.operator_inbox import OPERATOR_KEY
 from lapwing.services.process_table import ROUTER

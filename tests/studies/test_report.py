@@ -31,7 +31,8 @@ from lapwing.messages import (
     VehicleState,
     header,
 )
-from lapwing.studies.flight_data import AXES, FlightData
+from lapwing.studies.flight_data import FlightData
+from lapwing.studies.flight_tracking import AXES
 from lapwing.studies.report import flight_header, paper, plotly_script, plotly_traces, plots, write
 from lapwing.studies.report.downsampling import thin
 from lapwing.studies.report.flight_cover import cover

@@ -6,7 +6,8 @@ the blocks of all services.
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from operator import itemgetter
+from typing import Any
 
 import numpy as np
 
@@ -14,7 +15,7 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.compiled_block import Block, BoundBlock, bind
 from lapwing.cosim.diagram.execution_groups import ExecutionGroup, advance_groups, independent_groups
 from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
-from lapwing.cosim.diagram.topic_encoder import RecordBatch, TopicEncoder, due_ticks, encode
+from lapwing.cosim.diagram.topic_encoder import RecordBatch, TopicEncoder, due_ticks, encode, to_record_batches
 from lapwing.cosim.run_errors import DivergedError, LockStepError
 from lapwing.kernels.row_packing import pack_row, row_unpacker, row_width
 from lapwing.messages.topics import Topic
@@ -23,44 +24,19 @@ NEVER = 2**62  # [tick]
 SPARE = 8  # rows of a port in addition to those of a tick block
 
 
-class PythonBlock(Protocol):
-    """Python block: it runs at the ticks that it requests, or when a block before it wakes it."""
-
-    name: str
-    outputs: tuple[Port, ...]
-
-    def bind(self, graph: "BlockDiagram") -> None:
-        """Store the diagram whose rows it reads and writes; called before the first tick."""
-        ...
-
-    def on_tick(self, tick: int) -> int:
-        """Run the block at `tick`. Return the tick of its next wake-up, or NEVER to wait for another block."""
-        ...
-
-
-class ConnectedBlock(PythonBlock, Protocol):
-    """A Python block with a connection to a program outside the run."""
-
-    def open(self, report_wait: Callable[[str], None]) -> None:
-        """Connect before the first tick. Each wait, here and in `on_tick`, calls `report_wait` with a text."""
-        ...
-
-    def close(self) -> None:
-        """End the connection."""
-        ...
-
-    @property
-    def reports(self) -> dict[str, str]:
-        """Entries of the log's metadata."""
-        ...
-
-
 @dataclass
 class Service:
-    """Running lock-step service: its blocks in their order, and its topics."""
+    """Running lock-step service: its blocks in their order, and its topics.
+
+    A block is a compiled `Block`, or a Python object with a `name`, `outputs` (ports), and the methods `bind(diagram)`,
+    called before the first tick, and `on_tick(tick)`, which runs the block and returns the tick of its next wake-up, or
+    NEVER to wait for another block. If it has a connection to a program outside the run, it also has
+    `open(report_wait)`, `close()` and `reports`, entries of the log's metadata; each wait, in `open` and `on_tick`,
+    calls `report_wait` with a text.
+    """
 
     name: str
-    parts: Sequence[Any]  # Block or PythonBlock
+    parts: Sequence[Any]
     wires: Sequence[TopicEncoder]
     messages: list[tuple[Topic, int, bytes]] = field(default_factory=list)  # (topic, tick, payload) not yet fetched
     python_topics: Sequence[Topic] = ()  # the topics of `messages`
@@ -69,6 +45,20 @@ class Service:
     def topics(self) -> list[Topic]:
         """All topics that it publishes."""
         return [*(wire.topic for wire in self.wires), *self.python_topics]
+
+
+class ExternalBlock:
+    """Block whose outputs are written from outside of the diagram."""
+
+    def __init__(self, name: str, *outputs: Port):
+        self.name, self.outputs = name, outputs
+
+    def bind(self, graph: "BlockDiagram") -> None:
+        """Do nothing."""
+
+    def on_tick(self, tick: int) -> int:
+        """Return NEVER: the outputs are written from outside."""
+        return NEVER
 
 
 class BlockDiagram:
@@ -131,7 +121,7 @@ class BlockDiagram:
         return [part for part in self._parts if hasattr(part, "reports")]
 
     def open(self, report_wait: Callable[[str], None] = lambda text: None) -> None:
-        """Connect the blocks that have a connection; see `ConnectedBlock`."""
+        """Connect the blocks that have a connection; see `Service`."""
         for part in self._connected:
             part.open(report_wait)
 
@@ -182,7 +172,7 @@ class BlockDiagram:
         self.tick = max(self.tick, stop)
         if len(self._groups) > 1:
             for service in self.services:
-                service.messages.sort(key=_tick)
+                service.messages.sort(key=itemgetter(1))
         if failed is not None:
             raise failed
 
@@ -270,18 +260,6 @@ class BlockDiagram:
         return 0 if period == LATCHED else (ticks // period) & (len(self._rows[port]) - 1)
 
 
-def to_record_batches(messages: Iterable[tuple[Topic, int, bytes]]) -> list[RecordBatch]:
-    """Group messages (topic, tick, payload) into record batches of equal topic and length."""
-    groups: dict[tuple[Topic, int], list[tuple[int, bytes]]] = {}
-    for topic, tick, payload in messages:
-        groups.setdefault((topic, len(payload)), []).append((tick, payload))
-    result = []
-    for (topic, size), group in groups.items():
-        payloads = np.frombuffer(b"".join(payload for _, payload in group), np.uint8).reshape(-1, size)
-        result.append(RecordBatch(topic, np.array([tick for tick, _ in group], np.int64), payloads))
-    return result
-
-
 def _ring(port: Port, ticks: int, delay: int, former: np.ndarray | None) -> np.ndarray:
     """Return rows for `ticks` ticks, in the memory of `former` if it has the same shape."""
     rows = 1 if port.period == LATCHED else -(-ticks // port.period) + SPARE
@@ -290,10 +268,6 @@ def _ring(port: Port, ticks: int, delay: int, former: np.ndarray | None) -> np.n
         return np.zeros(shape)
     former[: SPARE + delay] = former[-SPARE - delay :] = 0.0  # rows of ticks before 0 are read before they are written
     return former
-
-
-def _tick(message: tuple[Topic, int, bytes]) -> int:
-    return message[1]
 
 
 def _divergence_error(name: str) -> Any:

@@ -5,7 +5,7 @@ that fixes its texts and the lengths of its sequences. If texts change during a 
 service's table of texts, and a batch is split into parts of the same texts.
 """
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -73,3 +73,15 @@ def due_ticks(first: int, stop: int, period: int) -> np.ndarray:
     """Return the ticks of [first, stop) at which a message of this period is due, (n,) int64."""
     begin = -(-max(first, 0) // period) * period
     return np.arange(begin, stop, period, dtype=np.int64)
+
+
+def to_record_batches(messages: Iterable[tuple[Topic, int, bytes]]) -> list[RecordBatch]:
+    """Group messages (topic, tick, payload) into record batches of equal topic and length."""
+    groups: dict[tuple[Topic, int], list[tuple[int, bytes]]] = {}
+    for topic, tick, payload in messages:
+        groups.setdefault((topic, len(payload)), []).append((tick, payload))
+    result = []
+    for (topic, size), group in groups.items():
+        payloads = np.frombuffer(b"".join(payload for _, payload in group), np.uint8).reshape(-1, size)
+        result.append(RecordBatch(topic, np.array([tick for tick, _ in group], np.int64), payloads))
+    return result

@@ -5,8 +5,7 @@ import os
 import time
 from contextlib import suppress
 
-from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram, Service
-from lapwing.cosim.diagram.tick_schedule import Port
+from lapwing.cosim.diagram.block_diagram import BlockDiagram, ExternalBlock, Service
 from lapwing.cosim.executors import realtime
 from lapwing.cosim.executors.deadlines import Deadlines
 from lapwing.cosim.executors.log_backpressure import LogBackpressure
@@ -117,20 +116,6 @@ def _leave(process: Participant, sender: PacketSender, stop: int) -> None:
     process.leave(lambda: sender.publish_end(stop))
 
 
-class _Rows:
-    """Placeholder for the blocks of an external service: its ports, whose rows arrive on the bus."""
-
-    def __init__(self, service: str, ports: tuple[Port, ...]):
-        self.name, self.outputs = service, ports
-
-    def bind(self, graph: BlockDiagram) -> None:
-        """Do nothing, because the rows arrive on the bus."""
-
-    def on_tick(self, tick: int) -> int:
-        """Do nothing, because the rows have arrived."""
-        return NEVER
-
-
 def run_encoder(process: Participant, service: Service) -> None:
     """Encode the messages of an external service, which publishes rows only.
 
@@ -143,7 +128,7 @@ def run_encoder(process: Participant, service: Service) -> None:
         LockStepError: a step packet is missing or out of order.
     """
     ports = process.setup.services[service.name].ports
-    external = Service(service.name, [_Rows(service.name, ports)], service.wires)
+    external = Service(service.name, [ExternalBlock(service.name, *ports)], service.wires)
     graph = BlockDiagram(process.setup, [external], 2 * PAGE)
     receiver = PacketReceiver(process, service.name, [(port.name, port.period, 0) for port in ports], graph)
     sender = PacketSender(process, external, graph, publishes_steps=False)

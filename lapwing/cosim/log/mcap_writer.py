@@ -142,10 +142,10 @@ class Container:
         offset = end = self._offset
         length = len(records[0])
         index_offsets: dict[int, int] = {}
-        for index_record in messages.indexes:
+        for entry in messages.indexes:
             end += len(records[-1])
-            index_offsets[index_record.channel_id] = end
-            records.append(index_record.record(len(head)))
+            index_offsets[entry.channel_id] = end
+            records.append(entry.record(len(head)))
         record = b"".join(records)
         index = ChunkIndex(
             chunk_start_offset=offset,
@@ -165,12 +165,10 @@ class Container:
         except OSError:
             self._chunks.extent = before
             raise
-        self._schemas += [index_record for index_record in declarations if isinstance(index_record, Schema)]
-        self._channels += [index_record for index_record in declarations if isinstance(index_record, Channel)]
-        for index_record in messages.indexes:
-            self._counts[index_record.channel_id] = self._counts.get(index_record.channel_id, 0) + len(
-                index_record.times_ns
-            )
+        self._schemas += [record for record in declarations if isinstance(record, Schema)]
+        self._channels += [record for record in declarations if isinstance(record, Channel)]
+        for entry in messages.indexes:
+            self._counts[entry.channel_id] = self._counts.get(entry.channel_id, 0) + len(entry.times_ns)
         self._cut()
 
     def finish(self) -> None:

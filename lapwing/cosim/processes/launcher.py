@@ -4,19 +4,18 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import ExitStack, suppress
 from threading import Thread
-from types import MappingProxyType
 from typing import IO
 
 from lapwing.cosim.access.private_sockets import private_endpoints
 from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.processes.child_process import Child, start, terminate_unused
-from lapwing.cosim.processes.cpu_starvation import starved_time
+from lapwing.cosim.processes.patience import Patience
 from lapwing.cosim.processes.run_monitor import LONGEST, MONITOR, RunMonitor
 from lapwing.cosim.processes.supervisor import SHUTDOWN_TIMEOUT, RunState, RunSupervisor, reason
 from lapwing.cosim.run_errors import END_SIGNAL
-from lapwing.cosim.transport.bus import ZenohBus, mesh
+from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import ALIVE_KEY
-from lapwing.cosim.transport.session_settings import CHILD_LINKS
+from lapwing.cosim.transport.session_settings import CHILD_LINKS, mesh
 
 TERM_TIMEOUT = 1.5  # [s] from the request to end to SIGKILL
 BRIEF = 0.005  # [s] between two checks whether all processes have exited
@@ -27,10 +26,10 @@ def launch(
     send_spec: Callable[[str, dict[str, str], IO[bytes]], None],
     publisher_ids: PublisherIds,
     observe: Callable[[RunMonitor], bool],
-    optional: Iterable[str] = (),
-    external: Mapping[str, str] = MappingProxyType({}),
-    started: dict[str, Child] | None = None,
-    services: Iterable[str] = (),
+    optional: list[str],
+    external: Mapping[str, str],
+    early: dict[str, Child],
+    services: Iterable[str],
 ) -> dict[str, str]:
     """Run the processes as children until the run ends. Return the final output of each optional process.
 
@@ -41,14 +40,13 @@ def launch(
         observe: called about five times a second; the run is ended when it returns True.
         optional: names of processes that may end without ending the run.
         external: endpoints of the required participants that are started elsewhere; all others connect to them.
-        started: processes that run already (`start_early`); those that the run does not need are ended.
+        early: processes that run already (`start_early`); those that the run does not need are ended.
         services: services that publish log packets.
 
     Raises:
         RunFailed: a service died or stalled, or the run ended early.
         ValueError: a service rejected its configuration; the text says why.
     """
-    optional, early = list(optional), started or {}
     # optional ones first: a ground station may be waiting for its link
     own = [name for name in [*optional, *required] if name not in external]
     children: dict[str, Child] = {}
@@ -111,13 +109,8 @@ def _request_end(children: Iterable[Child]) -> None:
 
 def _wait(children: list[Child], seconds: float) -> None:
     """Wait until all processes have exited, at most `seconds` plus the time that they waited for a CPU."""
-    start = time.monotonic()
-    starved_before = {child.process.pid: starved_time(child.process.pid) for child in children}
-    while running := [child.process.pid for child in children if child.process.poll() is None]:
-        elapsed = time.monotonic() - start
-        starved = sum(max(0.0, starved_time(pid) - starved_before[pid]) for pid in running)
-        if elapsed > LONGEST or elapsed - starved > seconds:
-            return
+    patience = Patience(seconds, *(child.process.pid for child in children), longest=LONGEST)
+    while any(child.process.poll() is None for child in children) and not patience.over:
         time.sleep(BRIEF)
 
 

@@ -39,7 +39,7 @@ class RunSupervisor:
         monitor: RunMonitor,
         children: Mapping[str, Child],
         required: Iterable[str],
-        external: Iterable[str] = (),
+        external: Iterable[str],
         clock: Callable[[], float] = time.monotonic,
         is_stopped: Callable[[ChildProcess], bool] | None = None,
     ):

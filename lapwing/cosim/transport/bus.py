@@ -4,13 +4,12 @@ The single-process mode needs no bus.
 """
 
 import json
-import os
 import queue
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Iterable, Mapping
+from contextlib import suppress
 from types import MappingProxyType
 from typing import Any
 
@@ -18,12 +17,9 @@ import zenoh
 
 from lapwing.cosim.run_errors import BusError
 from lapwing.cosim.transport.ring_subscription import Inbox
-from lapwing.cosim.transport.session_settings import session_settings
+from lapwing.cosim.transport.session_settings import one_runtime_thread, session_settings
 from lapwing.cosim.transport.subscription import Message, Subscription
 from lapwing.messages.attachment import pack, time_and_gid
-
-# One runtime thread instead of six: the largest single gain in latency (see docs/reference/benchmarks.md).
-_RUNTIME = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:app),app:(worker_threads:1))"
 
 INBOX = 4096  # [messages] far more than arrive in lock step before one is read
 WAKE = 0.05  # [s] between two checks of the deadlines of waiting threads
@@ -69,7 +65,7 @@ class ZenohBus:
         _opened = True
         listen, connect = list(listen), list(connect)
         try:
-            with _one_runtime_thread():
+            with one_runtime_thread():
                 settings = {**session_settings(listen, connect, mode, awaits), **security}
                 self._session = zenoh.open(_zenoh_config(settings))
         except zenoh.ZError as error:
@@ -231,19 +227,6 @@ class ZenohBus:
         self.close()
 
 
-@contextmanager
-def _one_runtime_thread() -> Iterator[None]:
-    """Set ZENOH_RUNTIME, which Zenoh reads when it opens a session; programs started later do not inherit it."""
-    if "ZENOH_RUNTIME" in os.environ:
-        yield
-        return
-    os.environ["ZENOH_RUNTIME"] = _RUNTIME
-    try:
-        yield
-    finally:
-        os.environ.pop("ZENOH_RUNTIME", None)
-
-
 def _zenoh_config(settings: Mapping[str, Any]) -> zenoh.Config:
     config = zenoh.Config()
     for key, value in settings.items():
@@ -264,12 +247,3 @@ def _message(sample: zenoh.Sample) -> Message | None:
     if not payload and sample.kind != zenoh.SampleKind.PUT:
         return None
     return time_ns, gid, payload
-
-
-def mesh(name: str, endpoints: Mapping[str, str]) -> tuple[list[str], list[str]]:
-    """Return the endpoints on which participant `name` listens and to which it connects: each pair is linked once.
-
-    It does not depend on the order of `endpoints`, which need not be the same for all of them.
-    """
-    names = sorted(endpoints)
-    return [endpoints[name]], [endpoints[other] for other in names[: names.index(name)]]

@@ -30,13 +30,7 @@ def layout(setup: RunConfig) -> dict[str, Any]:
         "interval_ns": setup.interval_ns,
         "last_tick": setup.last_tick,
         "order": setup.order,
-        "keys": {
-            "step": STEP_KEY,
-            "batch": BATCH_KEY,
-            "alive": ALIVE_KEY,
-            "waiting": WAITING_KEY,
-            "setup": SETUP_KEY,
-        },
+        "keys": {"step": STEP_KEY, "batch": BATCH_KEY, "alive": ALIVE_KEY, "waiting": WAITING_KEY, "setup": SETUP_KEY},
         "services": {
             name: {
                 "inputs": [{"port": i.port, "delay": i.delay} for i in service.inputs],

@@ -1,15 +1,18 @@
-"""Zenoh session settings, and the time-out of TCP connections."""
+"""Zenoh session settings: entries of the configuration, links of a mesh, runtime threads, TCP time-outs."""
 
 import os
 import socket
 import stat
-from collections.abc import Sequence
-from contextlib import suppress
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager, suppress
 from typing import Any
 
 LEASE_MS = 10_000  # [ms] without a message after which a peer counts as lost; the launcher detects it earlier
 OPEN_MS = 2_000  # [ms] for one attempt to reach a peer; closing a session waits for the current attempt
 LARGEST = 1 << 26  # [bytes] limit of a fragmented message; run configurations and log packets are smaller
+
+# One runtime thread instead of six: the largest single gain in latency (see docs/reference/benchmarks.md).
+_RUNTIME = "(rx:(handover:app),acc:(handover:app),tx:(handover:app),net:(handover:app),app:(worker_threads:1))"
 
 
 def session_settings(listen: Sequence[str], connect: Sequence[str], mode: str, awaits: bool) -> dict[str, Any]:
@@ -61,3 +64,25 @@ def limit_silence(milliseconds: int) -> None:
             if stat.S_ISSOCK(os.fstat(descriptor).st_mode):
                 with socket.socket(fileno=os.dup(descriptor)) as result:
                     result.setsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT, milliseconds)
+
+
+@contextmanager
+def one_runtime_thread() -> Iterator[None]:
+    """Set ZENOH_RUNTIME, which Zenoh reads when it opens a session; programs started later do not inherit it."""
+    if "ZENOH_RUNTIME" in os.environ:
+        yield
+        return
+    os.environ["ZENOH_RUNTIME"] = _RUNTIME
+    try:
+        yield
+    finally:
+        os.environ.pop("ZENOH_RUNTIME", None)
+
+
+def mesh(name: str, endpoints: Mapping[str, str]) -> tuple[list[str], list[str]]:
+    """Return the endpoints on which participant `name` listens and to which it connects: each pair is linked once.
+
+    It does not depend on the order of `endpoints`, which need not be the same for all of them.
+    """
+    names = sorted(endpoints)
+    return [endpoints[name]], [endpoints[other] for other in names[: names.index(name)]]

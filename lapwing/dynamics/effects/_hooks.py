@@ -47,12 +47,12 @@ The discrete state of an effect is a tuple of floats, at first `initial_discrete
 """
 
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 from numba.core.errors import TypingError
 
 from lapwing.dynamics.effects._axes import beside, in_world
-from lapwing.dynamics.vector import Vec3, add, apply
+from lapwing.dynamics.vector import add, apply
 from lapwing.kernels import DispatchTable, always_inline
 from lapwing.kernels.codegen import compile_source, generic
 
@@ -140,10 +140,38 @@ def _generate_calls(
 
 
 def _chain(hook: str, before: str = "") -> Callable:
+    """Return the function that passes `value` through all hooks."""
     call = f"value = f{{i}}(effects[{{i}}], memory[{{i}}], {before}value)"
     return _generate_calls(f"all_{hook}", hook, f"{before}value", call, "value")
 
 
+def _update(name: str, hook: str, arguments: str) -> Callable:
+    """Return the function that replaces the memory of each effect with the result of its hook."""
+    return _generate_calls(
+        name, hook, arguments, f"m{{i}} = f{{i}}(effects[{{i}}], memory[{{i}}], {arguments})", "memory"
+    )
+
+
+def _combine(name: str, hook: str, arguments: str, combination: str, default: str, parameters: str = "") -> Callable:
+    """Return the function that combines the results of all hooks.
+
+    Args:
+        name: of the function.
+        hook: called with effect, memory and `arguments`.
+        arguments: of the hook.
+        combination: expression of `value` and the next {call}.
+        default: result if no effect has the hook.
+        parameters: further parameters of the function.
+    """
+    call = f"f{{i}}(effects[{{i}}], memory[{{i}}], {arguments})"
+    signature = ", ".join(filter(None, (arguments, parameters)))
+    more = "value = " + combination.format(call=call)
+    return _generate_calls(name, hook, signature, f"value = {call}", "value", default=default, more=more)
+
+
+_ADD_WRENCH = (
+    "w{i} = f{i}(effects[{i}], memory[{i}], s, rotors); force, torque = add(force, w{i}[0]), add(torque, w{i}[1])"
+)
 all_mass_properties = _chain("mass_properties")
 all_air = _chain("air", "s, ")
 all_air_rate = _chain("air_rate", "s, ")
@@ -151,6 +179,7 @@ all_load_factors = _chain("load_factors", "s, ")
 all_loads = _chain("loads", "s, factors, ")
 all_supply_voltage = _chain("supply_voltage")
 all_winds = _chain("wind")
+next_breakpoint = _chain("break_time", "t, h, ")
 all_torques = _generate_calls(
     "all_torques",
     "torque",
@@ -165,87 +194,21 @@ all_body_wrenches = _generate_calls(
     "force, moment = f{i}(effects[{i}], memory[{i}], s, rotors); torque = add(torque, moment)",
     "(apply(s.R_world_body, beside(thrust, force)), torque)",
     default="(in_world(thrust, s.R_world_body), torque)",
-    more="w{i} = f{i}(effects[{i}], memory[{i}], s, rotors); force, torque = add(force, w{i}[0]), add(torque, w{i}[1])",
+    more=_ADD_WRENCH,
 )
-all_wrenches = _generate_calls(
-    "all_wrenches",
-    "wrench",
-    "s, rotors, force, torque",
-    "w{i} = f{i}(effects[{i}], memory[{i}], s, rotors); force, torque = add(force, w{i}[0]), add(torque, w{i}[1])",
-    "(force, torque)",
-)
+all_wrenches = _generate_calls("all_wrenches", "wrench", "s, rotors, force, torque", _ADD_WRENCH, "(force, torque)")
 all_fields = _generate_calls(
-    "all_fields",
-    "field",
-    "value",
-    "value = add(value, f{i}(effects[{i}], memory[{i}]))",
-    "value",
+    "all_fields", "field", "value", "value = add(value, f{i}(effects[{i}], memory[{i}]))", "value"
 )
-all_motors = _generate_calls(
-    "all_motors",
-    "motor",
-    "s, loads, voltage, default",
-    "value = f{i}(effects[{i}], memory[{i}], s, loads, voltage)",
-    "value",
-    default="default",
-)
-all_battery_states = _generate_calls(
-    "all_battery_states",
-    "battery_state",
-    "default",
-    "value = f{i}(effects[{i}], memory[{i}])",
-    "value",
-    default="default",
-)
-all_discrete_updates = _generate_calls(
-    "all_discrete_updates",
-    "discrete_update",
-    "s, rotors, key, tick, interval",
-    "m{i} = f{i}(effects[{i}], memory[{i}], s, rotors, key, tick, interval)",
-    "memory",
-)
-all_timed_updates = _generate_calls(
-    "all_timed_updates", "timed_update", "t", "m{i} = f{i}(effects[{i}], memory[{i}], t)", "memory"
-)
-next_breakpoint = _generate_calls(
-    "next_breakpoint", "break_time", "t, h, value", "value = f{i}(effects[{i}], memory[{i}], t, h, value)", "value"
-)
-all_substeps = _generate_calls(
-    "all_substeps",
-    "substeps",
-    "motion, h",
-    "n = f{i}(effects[{i}], memory[{i}], motion, h)",
-    "n",
-    default="1",
-    more="n = max(n, f{i}(effects[{i}], memory[{i}], motion, h))",
-)
-all_contacts = _generate_calls(
-    "all_contacts",
-    "contact",
-    "s",
-    "touching = f{i}(effects[{i}], memory[{i}], s)",
-    "touching",
-    default="False",
-    more="touching = touching or f{i}(effects[{i}], memory[{i}], s)",
-)
-all_contact_forces = _generate_calls(
-    "all_contact_forces",
-    "contact_forces",
-    "motion",
-    "forces = f{i}(effects[{i}], memory[{i}], motion)",
-    "forces",
-    default="()",
-    more="forces = forces + f{i}(effects[{i}], memory[{i}], motion)",
-)
-all_switches = _generate_calls(
-    "all_switches",
-    "switches",
-    "s, voltage, h",
-    "switching = f{i}(effects[{i}], memory[{i}], s, voltage, h)",
-    "switching",
-    default="False",
-    more="switching = switching or f{i}(effects[{i}], memory[{i}], s, voltage, h)",
-)
+all_motors = _combine("all_motors", "motor", "s, loads, voltage", "{call}", "default", "default")
+all_battery_states = _combine("all_battery_states", "battery_state", "", "{call}", "default", "default")
+all_discrete_updates = _update("all_discrete_updates", "discrete_update", "s, rotors, key, tick, interval")
+all_timed_updates = _update("all_timed_updates", "timed_update", "t")
+all_substeps = _combine("all_substeps", "substeps", "motion, h", "max(value, {call})", "1")
+all_contacts = _combine("all_contacts", "contact", "s", "value or {call}", "False")
+all_contact_forces = _combine("all_contact_forces", "contact_forces", "motion", "value + {call}", "()")
+all_switches = _combine("all_switches", "switches", "s, voltage, h", "value or {call}", "False")
+all_can_sleep = _combine("all_can_sleep", "can_sleep", "", "value and {call}", "True")
 all_sleeping = _generate_calls(
     "all_sleeping",
     "is_sleeping",
@@ -255,89 +218,3 @@ all_sleeping = _generate_calls(
     default="True",
     more="sleeping = sleeping and f{i}(effects[{i}], motion, h)",
 )
-all_can_sleep = _generate_calls(
-    "all_can_sleep",
-    "can_sleep",
-    "",
-    "able = f{i}(effects[{i}], memory[{i}])",
-    "able",
-    default="True",
-    more="able = able and f{i}(effects[{i}], memory[{i}])",
-)
-
-
-@generic(inline=True)
-def all_stiff_sleeping(effects: Any, memory: Any, motion: Any, h: Any) -> Callable:
-    """Return True if every stiff effect is sleeping, and can."""
-    both = HOOKS["substeps"], HOOKS["is_sleeping"]
-    stiff = [
-        (i, e.instance_class) for i, e in enumerate(effects.types) if all(e.instance_class in hook for hook in both)
-    ]
-    names: dict[str, Any] = {}
-    calls = []
-    for hook, arguments in (("is_sleeping", "motion, h"), ("can_sleep", "memory[{i}]")):
-        for i, parameters in stiff:
-            if parameters in HOOKS[hook]:
-                names[f"{hook}{i}"] = HOOKS[hook][parameters]
-                calls.append(f"{hook}{i}(effects[{i}], {arguments.format(i=i)})")
-    return compile_source(
-        "all_stiff_sleeping(effects, memory, motion, h)", names, f"return {' and '.join(calls) or 'True'}"
-    )
-
-
-@generic(inline=True)
-def without_sleepers(effects: Any, values: Any) -> Callable:
-    """Return the members of `values`, one for each effect, that belong to effects that never sleep."""
-    items = "".join(
-        f"values[{i}], " for i, e in enumerate(effects.types) if e.instance_class not in HOOKS["is_sleeping"]
-    )
-    return compile_source("without_sleepers(effects, values)", {}, f"return ({items})")
-
-
-class KnownWrench(NamedTuple):
-    """Placeholder of an effect whose wrench has been evaluated together with the rate of its memory."""
-
-    force_world: Vec3  # [N]
-    torque_body: Vec3  # [N m]
-
-
-@wrench(KnownWrench)
-def known_wrench(e, memory, s, rotors):
-    """Return the wrench."""
-    return e.force_world, e.torque_body
-
-
-def _hooks_with_rate(effects: Any) -> list[tuple[int, Callable]]:
-    """Return (number, hook) of each effect whose memory has a rate."""
-    rates = HOOKS["wrench_and_rate"]
-    return [(i, rates[e.instance_class]) for i, e in enumerate(effects.types) if e.instance_class in rates]
-
-
-@generic(inline=True)
-def with_rates(effects: Any, memory: Any, motion: Any) -> Callable:
-    """Return (effects, with the wrenches of those that have one in their place; rates of their memories)."""
-    active = dict(_hooks_with_rate(effects))
-    names = {"known": KnownWrench, **{f"f{i}": hook for i, hook in active.items()}}
-    lines = [f"force{i}, torque{i}, rate{i} = f{i}(effects[{i}], memory[{i}], motion)" for i in active]
-    count = len(effects.types)
-    items = "".join(f"known(force{i}, torque{i}), " if i in active else f"effects[{i}], " for i in range(count))
-    rates = "".join(f"rate{i}, " for i in active)
-    return compile_source("with_rates(effects, memory, motion)", names, *lines, f"return ({items}), ({rates})")
-
-
-@generic(inline=True)
-def all_integrated(effects: Any, memory: Any) -> Callable:
-    """Return the memories that have a rate."""
-    members = "".join(f"memory[{i}], " for i, _ in _hooks_with_rate(effects))
-    return compile_source("all_integrated(effects, memory)", {}, f"return ({members})")
-
-
-@generic(inline=True)
-def with_integrated(effects: Any, memory: Any, integrated: Any) -> Callable:
-    """Return the memories of all effects, with those that have a rate from `integrated`."""
-    integrated = [i for i, _ in _hooks_with_rate(effects)]
-    members = [
-        f"integrated[{integrated.index(i)}]" if i in integrated else f"memory[{i}]" for i in range(len(effects.types))
-    ]
-    result = "".join(f"{member}, " for member in members)
-    return compile_source("with_integrated(effects, memory, integrated)", {}, f"return ({result})")

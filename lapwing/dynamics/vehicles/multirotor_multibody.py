@@ -3,15 +3,14 @@
 Parameters, propeller failures and initial state; the equations of motion are in `multirotor_multibody_equations`.
 """
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from lapwing.dynamics.effects._types import PerRotor
 from lapwing.dynamics.effects.gyroscopic_torque import GyroscopicTorque
-from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
 from lapwing.dynamics.multibody import five_bodies, five_body_stabilisation
 from lapwing.dynamics.multibody.delivery_drone import Drone
 from lapwing.dynamics.multibody.five_bodies import BodyState
-from lapwing.dynamics.vector import ZERO, Vec3
+from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState
 from lapwing.dynamics.vehicles.multirotor_multibody_equations import Assembly
@@ -86,19 +85,12 @@ def with_propeller_failure(p: MultirotorParameters, k: int, becomes: str) -> Mul
     return p._replace(layout=p.layout._replace(bodies=bodies))
 
 
-def initial_state(
-    p: MultirotorParameters,
-    position_world: Vec3 = ZERO,
-    attitude: Quaternion = NO_ROTATION,
-    rotor_speed: float = 0.0,
-    velocity_world: Vec3 = ZERO,
-    omega_body: Vec3 = ZERO,
-) -> MultirotorState:
-    """Return a state with all rotors at one speed [rad/s], blades along x, initial effects; by default at rest."""
-    plain = multirotor.initial_state(p, position_world, attitude, rotor_speed)
-    d = p.layout.bodies.drone
-    chassis = BodyState(position_world, attitude, velocity_world, omega_body)
-    speeds = tuple(-sign * rotor_speed for sign in p.layout.reaction_sign)
+def initial_state(p: MultirotorParameters, *start: Any, **named: Any) -> MultirotorState:
+    """Return a state with the blades along x; see `multirotor.initial_state`."""
+    plain = multirotor.initial_state(p, *start, **named)
+    motion, d = plain.motion, p.layout.bodies.drone
+    chassis = BodyState(motion.position_world, motion.attitude, motion.velocity_world, motion.omega_body)
+    speeds = tuple(-sign * speed for sign, speed in zip(p.layout.reaction_sign, motion.rotor_speed, strict=True))
     x = five_body_stabilisation.assembled_state(
         five_bodies.machine(d, ZERO, speeds=speeds), chassis, (0.0,) * 4, speeds
     )

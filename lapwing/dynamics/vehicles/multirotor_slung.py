@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, NamedTuple
 
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.effects._types import Motion
-from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion, rotate, rotation_matrix
+from lapwing.dynamics.lie.quaternion import rotate, rotation_matrix
 from lapwing.dynamics.terrain import surface
 from lapwing.dynamics.vector import ZERO, Vec3, add, apply, apply_transposed, cross, dot, norm, scale, subtract
 from lapwing.dynamics.vehicles import multirotor
@@ -188,17 +188,10 @@ def parameters(airframe: "Airframe", sling: Sling, effects: tuple = ()) -> Multi
     return p._replace(layout=p.layout._replace(bodies=sling))
 
 
-def initial_state(
-    p: MultirotorParameters,
-    position_world: Vec3 = ZERO,
-    attitude: Quaternion = NO_ROTATION,
-    rotor_speed: float = 0.0,
-    velocity_world: Vec3 = ZERO,
-    omega_body: Vec3 = ZERO,
-) -> MultirotorState:
-    """Return the vehicle's initial state, with the load at rest below the hook or on the ground there."""
-    plain = multirotor.initial_state(p, position_world, attitude, rotor_speed, velocity_world, omega_body)
-    sling = p.layout.bodies
-    x, y, z = (float(v) for v in add(position_world, rotate(attitude, sling.hook_body)))
+def initial_state(p: MultirotorParameters, *start: Any, **named: Any) -> MultirotorState:
+    """Return a state with the load at rest below the hook or on the ground there; see `multirotor.initial_state`."""
+    plain = multirotor.initial_state(p, *start, **named)
+    v, sling = plain.motion, p.layout.bodies
+    x, y, z = (float(c) for c in add(v.position_world, rotate(v.attitude, sling.hook_body)))
     load = (x, y, max(z - sling.length, surface(sling.terrain, x, y)[0]))
-    return plain._replace(motion=SlungMotion(plain.motion, load, velocity_world))
+    return plain._replace(motion=SlungMotion(v, load, v.velocity_world))

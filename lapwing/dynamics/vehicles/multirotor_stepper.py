@@ -5,6 +5,7 @@ import sys
 from typing import Any, NamedTuple
 
 from lapwing.dynamics.effects import _hooks as hooks
+from lapwing.dynamics.effects import _stiff_effects as stiff_effects
 from lapwing.dynamics.integrators import SHORTEST, CompensatedSum, add, exact, extrapolate, rounded, value_of
 from lapwing.dynamics.vehicles.multirotor_equations import (
     FORMS,
@@ -69,8 +70,8 @@ def within(limit, voltage, _):
 @always_inline
 def _airborne(p, body, memory, voltage):
     """Return the drive without the effects that can sleep."""
-    effects = hooks.without_sleepers(p.effects, p.effects)
-    awake = hooks.without_sleepers(p.effects, memory)
+    effects = stiff_effects.without_sleepers(p.effects, p.effects)
+    awake = stiff_effects.without_sleepers(p.effects, memory)
     return MultirotorDrive(
         MultirotorParameters(p.body, p.layout, effects, p.tolerance, p.summation), body, awake, voltage
     )
@@ -102,13 +103,13 @@ def _project_form(drive, x):
 def _with_memories(drive, x):
     """Return the drive with the memories of the state."""
     p, body, memory, voltage = drive
-    return MultirotorDrive(p, body, hooks.with_integrated(p.effects, memory, x.memory), voltage)
+    return MultirotorDrive(p, body, stiff_effects.with_integrated(p.effects, memory, x.memory), voltage)
 
 
 @kernel
 def _awake_rate(drive, t, x):
     p, body, memory, voltage = _with_memories(drive, x)
-    effects, rates = hooks.with_rates(p.effects, memory, motion_of(p.layout, x.motion))
+    effects, rates = stiff_effects.with_rates(p.effects, memory, motion_of(p.layout, x.motion))
     parameters = MultirotorParameters(p.body, p.layout, effects, p.tolerance, p.summation)
     return AwakeState(_rate_of_form(MultirotorDrive(parameters, body, memory, voltage), t, x.motion), rates)
 
@@ -149,7 +150,7 @@ def _stiff_steps(method, drive, t, x, h, end):
     p, memory = drive.parameters, drive.memory
     allowed, part = p.tolerance, 2.0 * h
     smallest = SHORTEST * allowed
-    x = exact(p.summation, method, AwakeState(x, hooks.all_integrated(p.effects, memory)))
+    x = exact(p.summation, method, AwakeState(x, stiff_effects.all_integrated(p.effects, memory)))
     origin = _origin(x, t)
     t, end = t - origin, end - origin
     while True:
@@ -173,7 +174,7 @@ def _stiff_steps(method, drive, t, x, h, end):
         x = extrapolate(method, y, whole)
         if last or not sound:
             x = rounded(x)
-            return x.motion, hooks.with_integrated(p.effects, memory, x.memory)
+            return x.motion, stiff_effects.with_integrated(p.effects, memory, x.memory)
         t += size
 
 
@@ -234,7 +235,7 @@ def steps(method, drive, x, start, end, h, first, n):
             if asleep and not switching:
                 x = _step(method, airborne, start + i * h, x, h)
                 continue
-            if switching or not hooks.all_stiff_sleeping(p.effects, memory, seen, h):
+            if switching or not stiff_effects.all_stiff_sleeping(p.effects, memory, seen, h):
                 drive = MultirotorDrive(p, body, memory, voltage)
                 x, memory = _stiff_steps(method, drive, start + i * h, x, h, until)
                 break

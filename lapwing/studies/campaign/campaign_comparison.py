@@ -13,14 +13,7 @@ from lapwing.studies.campaign.results import Results
 from lapwing.studies.campaign.statistics import Interval, interval, paired_difference
 from lapwing.studies.metrics import METRICS
 
-PLAN_ENTRIES = (
-    "scene",
-    "overrides",
-    "vary",
-    "sweep",
-    "design",
-    "versions",
-)  # entries of a manifest that define the flights
+PLAN_ENTRIES = ("scene", "overrides", "vary", "sweep", "design", "versions")  # of a manifest; they define the flights
 
 
 class Difference(NamedTuple):

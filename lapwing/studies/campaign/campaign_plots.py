@@ -1,7 +1,6 @@
 """Plots of a campaign's report."""
 
 import re
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -9,15 +8,20 @@ import numpy as np
 from lapwing.studies.battery_use import WATT_HOUR
 from lapwing.studies.campaign.results import Results
 from lapwing.studies.campaign.statistics import ellipse, has_sobol, interval, rank_correlation, sobol
+from lapwing.studies.campaign.varied_parameters import (
+    TARGETS,
+    bins,
+    strongest_parameters,
+    texts_of,
+    varied_parameters,
+    with_unit,
+)
 from lapwing.studies.metrics import METRICS
 from lapwing.studies.report.plot import Band, Line, Mark, NotRecordedError, Panel, Plot, Stretch
 from lapwing.studies.report.style import AXIS_COLOURS, BOUND, COLOURS, FLOWN, QUIET, REFERENCE
 from lapwing.studies.tracking import DEGREE
 
 COLUMNS = 3  # panels in a row
-BINS = 10  # intervals of a parameter
-MAX_KEYS = 9  # parameters with a panel
-TARGETS = ("max_distance", "touchdown.speed", "energy")  # metrics for sensitivities, in addition to success
 MAX_LINES = 300  # runs drawn as lines over all parameters
 LABEL_LENGTH = 12  # characters in a line of an axis label
 SOBOL_MIN_RUNS, SOBOL_MAX_RUNS = 50, 10_000  # runs for Sobol indices
@@ -124,10 +128,10 @@ def _fleet_touchdown(results: Results) -> Plot:
 def success(results: Results) -> Plot:
     """Plot the probability of success over each parameter."""
     panels, is_success = [], results["success"].astype(bool)
-    keys, rest = _strongest_parameters(results)
+    keys, rest = strongest_parameters(results)
     for k, key in enumerate(keys):
         x, middles, groups = results.number(key), [], []
-        for in_bin in _bins(x):
+        for in_bin in bins(x):
             middles.append(float(x[in_bin].mean()))
             groups.append(interval(int(is_success[in_bin].sum()), int(in_bin.sum())))
         at, rows = np.array(middles), np.array(groups).T
@@ -138,7 +142,7 @@ def success(results: Results) -> Plot:
         label = "probability of success" if k % COLUMNS == 0 else ""
         position: dict[str, Any] = {"row": k // COLUMNS, "column": k % COLUMNS, "y_range": (-0.02, 1.02)}
         panels.append(
-            Panel(marks, label, _with_unit(results, key), x_ticks=_texts(results, key), timed=False, **position)
+            Panel(marks, label, with_unit(results, key), x_ticks=texts_of(results, key), timed=False, **position)
         )
     caption = "Share of successes in intervals of each parameter with equal numbers of runs."
     return _grid(panels, caption + rest)
@@ -146,7 +150,7 @@ def success(results: Results) -> Plot:
 
 def sensitivity(results: Results) -> Plot:
     """Plot sensitivities: rank correlations, and Sobol indices if SALib is installed."""
-    keys = _parameters(results)
+    keys = varied_parameters(results)
     targets = ["success"] if np.ptp(results["success"].astype(float)) > 0.0 else []
     targets += [name for name in TARGETS if name in results.figures]
     if not targets:
@@ -188,7 +192,7 @@ def sensitivity(results: Results) -> Plot:
 
 def parallel(results: Results) -> Plot:
     """Plot every run as a line over all parameters and target metrics, each scaled to its range."""
-    keys, rest = _strongest_parameters(results)
+    keys, rest = strongest_parameters(results)
     names = [*keys, *(name for name in TARGETS if name in results.figures)]
     if len(names) < 2:
         raise NotRecordedError("only one parameter varies")
@@ -196,11 +200,11 @@ def parallel(results: Results) -> Plot:
     for name in names:
         values, (label, scale) = (
             results.number(name),
-            label_and_factor(name) if name in METRICS else (_with_unit(results, name), 1.0),
+            label_and_factor(name) if name in METRICS else (with_unit(results, name), 1.0),
         )
         low, high = np.nanmin(values), np.nanmax(values)
         columns.append((values - low) / (high - low if high > low else 1.0))
-        texts = _texts(results, name)
+        texts = texts_of(results, name)
         ends = (texts[0], texts[-1]) if texts else (f"{scale * low:.3g}", f"{scale * high:.3g}")
         ticks.append(f"{_break_key(label)}\n{ends[0]}\nto {ends[1]}")
     rows, is_success = np.column_stack(columns), results["success"].astype(bool)
@@ -220,61 +224,6 @@ def parallel(results: Results) -> Plot:
 def _random_subset(n: int, most: int) -> np.ndarray:
     """Return at most `most` random indices of n runs; regular indices could match the steps of a grid."""
     return np.arange(n) if n <= most else np.sort(np.random.default_rng(1).choice(n, most, replace=False))
-
-
-def _parameters(results: Results) -> list[str]:
-    """Return the parameters that differ between the runs."""
-    keys = [key for key in results.folder.plan.keys if len(np.unique(results[key])) > 1]
-    if not keys:
-        raise NotRecordedError("no parameter varies; use --vary KEY=DISTRIBUTION")
-    return keys
-
-
-def _strongest_parameters(results: Results) -> tuple[list[str], str]:
-    """Return the at most `MAX_KEYS` parameters with the strongest correlations, and a text on the omitted ones."""
-    keys = _parameters(results)
-    if len(keys) <= MAX_KEYS:
-        return keys, ""
-    targets = [
-        results[name].astype(float) for name in ("success", *TARGETS) if name == "success" or name in results.figures
-    ]
-
-    def strength(key: str) -> float:
-        x = results.number(key)
-        every = (
-            abs(rank_correlation(x[is_finite], y[is_finite]).value)
-            for y in targets
-            if (is_finite := np.isfinite(y)).any()
-        )
-        return max((value for value in every if np.isfinite(value)), default=0.0)
-
-    selected = set(sorted(keys, key=strength, reverse=True)[:MAX_KEYS])
-    omitted = [key for key in keys if key not in selected]
-    return [
-        key for key in keys if key in selected
-    ], f" Omitted, because their correlations are weakest: {', '.join(omitted)}."
-
-
-def _bins(x: np.ndarray) -> Iterator[np.ndarray]:
-    """Yield a mask of the runs, shape (n,), for each value of a parameter or each interval with equal counts."""
-    values = np.unique(x)
-    if len(values) <= BINS:
-        yield from (x == value for value in values)
-        return
-    edges = np.quantile(x, np.linspace(0.0, 1.0, BINS + 1))
-    position = np.searchsorted(edges[1:-1], x, side="right")
-    yield from (position == k for k in np.unique(position))
-
-
-def _with_unit(results: Results, key: str) -> str:
-    """Return a parameter's key with its unit if known."""
-    unit = results.units.get(key, "")
-    return f"{key} [{unit}]" if unit else key
-
-
-def _texts(results: Results, name: str) -> tuple[str, ...]:
-    """Return the values of a text parameter in the order of their indices; () for numbers."""
-    return tuple(np.unique(results[name])) if results[name].dtype == object else ()
 
 
 def _break_key(key: str) -> str:

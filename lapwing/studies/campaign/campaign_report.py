@@ -4,6 +4,7 @@ import shlex
 from collections.abc import Callable
 from pathlib import Path
 
+from lapwing.cosim.output_lock import write_errors
 from lapwing.studies.campaign import campaign_plots, console_output
 from lapwing.studies.campaign.results import Results
 from lapwing.studies.report.matplotlib_figure import write_png
@@ -32,7 +33,7 @@ def write(path: Path, results: Results) -> None:
         ValueError: the file cannot be written.
     """
     sections = [_section(title, draw, results) for title, draw in PLOTS.items()]
-    try:
+    with write_errors(path):
         if path.suffix == ".html":
             path.write_text(_page(results, sections), encoding="utf-8")
         else:
@@ -41,8 +42,6 @@ def write(path: Path, results: Results) -> None:
                 write_pdf(path, _cover(results), titled_plots)
             else:
                 write_png(path, [titled.plot for titled in titled_plots])
-    except OSError as fault:
-        raise ValueError(f"{path}: cannot write the report: {fault.strerror or fault}") from None
 
 
 def _section(title: str, draw: Callable[[Results], Plot], results: Results) -> Section:

@@ -9,13 +9,12 @@ from collections.abc import Callable, Iterable, Iterator
 from typing import Any
 
 from lapwing.cosim.run_errors import RunFailed
+from lapwing.studies.workers import Workers
 
 SCHEDULER_TIMEOUT = 10.0  # [s]
 
 
-def dask(
-    address: str, notify: Callable[[str], None] = lambda line: None
-) -> Callable[[Callable[..., Any], Iterable[tuple]], Iterator[tuple[int, Any]]]:
+def dask(address: str, notify: Callable[[str], None] = lambda line: None) -> Workers:
     """Return a function that runs calls on the workers of a Dask scheduler, tcp://host:8786.
 
     Raises:

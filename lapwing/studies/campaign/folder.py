@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from lapwing.cosim.output_lock import write_errors
 from lapwing.cosim.run_errors import RunFailed
 from lapwing.services.common.run_schema import Published
 from lapwing.services.common.success_criteria import Success
@@ -164,12 +165,10 @@ def _create(path: Path, about: dict[str, Any]) -> None:
     """Create the folder of a campaign."""
     if path.exists() and (not path.is_dir() or any(not _may_be_new(file) for file in path.iterdir())):
         raise ValueError(f"{path}: holds other files; expected a new folder, or one of a campaign")
-    try:
+    with write_errors(path):
         (path / "shards").mkdir(parents=True, exist_ok=True)
         with complete_file(path / MANIFEST) as file:
             file.write_text(json.dumps(about, indent=2) + "\n", encoding="utf-8")
-    except OSError as fault:
-        raise ValueError(f"{path}: cannot be written: {(fault.strerror or str(fault)).lower()}") from None
 
 
 def _may_be_new(file: Path) -> bool:

@@ -14,11 +14,8 @@ from lapwing.studies.metrics import METRICS
 from lapwing.studies.outcome import KINDS
 from lapwing.studies.tracking import AXES
 
-MIN_IS_WORST = (
-    NEAREST,
-    *(f"within_3sigma.{axis}" for axis in "xyz"),
-    "within_95.nees",
-)  # the worst value of all other metrics is the largest
+# The worst value of all other metrics is the largest.
+MIN_IS_WORST = (NEAREST, *(f"within_3sigma.{axis}" for axis in "xyz"), "within_95.nees")
 
 
 class Results:

@@ -1,16 +1,14 @@
 """Execution of a campaign shard by shard, with counts of the outcomes."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from typing import Any, NamedTuple
+from collections.abc import Callable, Iterable, Mapping
+from typing import NamedTuple
 
 from lapwing.studies.campaign.folder import Folder
 from lapwing.studies.campaign.runs import REJECTED, Reference, Row, fly_runs
 from lapwing.studies.campaign.statistics import Interval, interval
 from lapwing.studies.outcome import KINDS
-
-Workers = Callable[[Callable[..., Any], Iterable[tuple]], Iterator[tuple[int, Any]]]
-"""(call, tasks) -> (index of the task, call(*task)) in order of completion."""
+from lapwing.studies.workers import Workers
 
 
 class Count(NamedTuple):

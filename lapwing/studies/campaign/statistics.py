@@ -99,9 +99,9 @@ def sobol(x: np.ndarray, y: np.ndarray, names: list[str]) -> list[Interval]:
     return indices
 
 
-def ellipse(points: np.ndarray, share: float, n: int = 90) -> np.ndarray:
-    """Return the ellipse (n, 2) with this share of a normal distribution fitted to points (k, 2)."""
+def ellipse(points: np.ndarray, share: float) -> np.ndarray:
+    """Return the ellipse (90, 2) with this share of a normal distribution fitted to points (k, 2)."""
     values, axes = np.linalg.eigh(np.cov(points.T))
     radius = np.sqrt(stats.chi2.ppf(share, 2) * np.clip(values, 0.0, None))
-    angle = np.linspace(0.0, 2.0 * np.pi, n)
+    angle = np.linspace(0.0, 2.0 * np.pi, 90)
     return points.mean(axis=0) + (radius * np.column_stack([np.cos(angle), np.sin(angle)])) @ axes.T

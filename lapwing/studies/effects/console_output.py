@@ -9,8 +9,7 @@ from rich.console import Console
 from rich.table import Table
 
 from lapwing.studies import json_file
-from lapwing.studies.effects.influence import Influence
-from lapwing.studies.effects.procedure import Row, Study
+from lapwing.studies.effects.procedure import Influence, Row, Study
 from lapwing.studies.report.matplotlib_figure import plot_style
 from lapwing.studies.report.style import BOUND, DPI, FLOWN, WIDTH
 

@@ -4,15 +4,40 @@ import math
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
+import numpy as np
+
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics import effects
 from lapwing.dynamics.effects._vehicle_interaction import INTERACTION
 from lapwing.services.autopilot.schema import Autopilot
 from lapwing.services.common.vehicle_schema import Effects, Vehicle
 from lapwing.studies.effects.cost import costs
-from lapwing.studies.effects.influence import Influence, influence
 from lapwing.studies.effects.variants import Tables, VariantPool, check_effects, variant_pool
 from lapwing.studies.flight_data import FlightData
+
+
+class Influence(NamedTuple):
+    """Change of a flight by one effect; infinite if the changed flight fails."""
+
+    trajectory: float  # [m] largest distance at equal times
+    final: float  # [m] distance of the final positions
+    energy: float  # relative change of the electrical energy
+    failure: str = ""  # error of the changed flight
+
+
+def influence(reference: FlightData, other: FlightData) -> Influence:
+    """Return the difference of `other` from `reference`; a shorter flight is extended by its last state."""
+    if other.failure:
+        return Influence(np.inf, np.inf, np.inf, other.failure)
+    count = max(len(reference.truth), len(other.truth))
+    a, b = (_extend(flight.truth.position, count) for flight in (reference, other))
+    distance = np.linalg.norm(a - b, axis=1)
+    change = (other.energy - reference.energy) / reference.energy if reference.energy else 0.0
+    return Influence(float(distance.max()), float(distance[-1]), float(change))
+
+
+def _extend(position: np.ndarray, count: int) -> np.ndarray:
+    return np.concatenate([position, np.repeat(position[-1:], count - len(position), axis=0)])
 
 
 class Row(NamedTuple):

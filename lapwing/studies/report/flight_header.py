@@ -5,6 +5,7 @@ from typing import Any
 
 from lapwing.cosim.executors.deadlines import MISSED, WORST
 from lapwing.studies.flight_data import FlightData
+from lapwing.studies.flight_provenance import solver_and_exchange
 
 LONG = 60  # largest number of characters of a value, or of an effect's keys
 MANY = 12  # largest number of listed keys in which two scenes differ
@@ -31,12 +32,7 @@ def facts(flight: FlightData) -> dict[str, str]:
         "landed": "yes" if flight.landed else "no" if flight.has("status") else "",
         "seed": metadata.get("seed", ""),
         "mode": metadata.get("mode", ""),
-        "solver": f"{metadata['solver_integrator']}, step {metadata['solver_step']} s"
-        if "solver_integrator" in metadata
-        else "",
-        "exchange": f"{metadata['exchange_rate']} Hz, {metadata.get('coupling', '')}"
-        if "exchange_rate" in metadata
-        else "",
+        **solver_and_exchange(metadata),
         "deadlines missed": f"{metadata[MISSED]} ticks; at most {metadata[WORST]} late" if MISSED in metadata else "",
         "version": metadata.get("version", ""),
         "commit": metadata.get("commit", ""),

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from lapwing.studies.flight_data import AXES, FlightData
+from lapwing.studies.flight_data import FlightData
+from lapwing.studies.flight_tracking import AXES
 from lapwing.studies.report.plot import Level, Line, NotRecordedError, Panel, Plot, reference
 
 DEGREES = 180.0 / np.pi  # [deg] in 1 rad

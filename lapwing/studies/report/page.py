@@ -7,7 +7,8 @@ from typing import Any, NamedTuple
 
 from jinja2 import Environment, FileSystemLoader
 
-from lapwing.studies.flight_data import AXES, FlightData
+from lapwing.studies.flight_data import FlightData
+from lapwing.studies.flight_tracking import AXES
 from lapwing.studies.metrics import unmet_criteria
 from lapwing.studies.report.flight_header import differences, facts
 from lapwing.studies.report.key_numbers import key_numbers, trouble

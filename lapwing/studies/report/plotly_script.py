@@ -36,8 +36,8 @@ def script() -> str:
     raise ValueError("the report needs plotly.js, which is missing; pip install plotly")
 
 
-def remove_unused_traces(text: str, traces: tuple[str, ...] = TRACES) -> str:
-    """Return plotly.js with these trace types only; unchanged if it is not bundled as described above."""
+def remove_unused_traces(text: str) -> str:
+    """Return plotly.js with TRACES only; unchanged if it is not bundled as described above."""
     starts = [(match.start(1), match[2]) for match in _MODULE.finditer(text)]
     register = _REGISTER.search(text)
     if not starts or register is None or register[2] != starts[-1][1]:
@@ -46,7 +46,7 @@ def remove_unused_traces(text: str, traces: tuple[str, ...] = TRACES) -> str:
     ends = [start for start, _ in starts[1:]] + [last]
     bodies = {name: text[start:end] for (start, name), end in zip(starts, ends, strict=True)}
     # The core registers scatter.
-    names = [name for name in _NAME.findall(register[1]) if _kind(name, bodies) in traces]
+    names = [name for name in _NAME.findall(register[1]) if _kind(name, bodies) in TRACES]
     entry = register[2]
     bodies[entry] = bodies[entry].replace(register[1], ",".join(f"{name}()" for name in names))
     owners = {inner: name for name, body in bodies.items() for inner in _INNER.findall(body)}

@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lapwing.cosim.output_lock import write_errors
 from lapwing.studies.report import plot as report
 from lapwing.studies.report.page import render
 from lapwing.studies.report.sections import Section
@@ -28,10 +29,8 @@ def write(path: Path, results: Sequence[Result]) -> None:
         verdict=verdict,
         distance=distance,
     )
-    try:
+    with write_errors(path):
         path.write_text(text, encoding="utf-8")
-    except OSError as fault:
-        raise ValueError(f"{path}: cannot write the page: {fault.strerror or fault}") from None
 
 
 def _sections(results: Sequence[Result]) -> Iterator[Section]:

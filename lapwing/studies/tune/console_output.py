@@ -91,10 +91,7 @@ def _errors(tuning: Tuning) -> Rows:
 
 def _corners(tuning: Tuning) -> Rows:
     rows = Rows(
-        "Flights of vehicles that differ from the controller's model",
-        "vehicle",
-        "max. position error, m",
-        "outcome",
+        "Flights of vehicles that differ from the controller's model", "vehicle", "max. position error, m", "outcome"
     )
     for corner, f in tuning.corners.items():
         rows.add(str(corner), f"{f['max_distance']:.3f}", f["outcome"], failed=bool(failure(f)))

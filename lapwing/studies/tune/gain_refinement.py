@@ -24,12 +24,8 @@ CANDIDATES = 60  # largest number of gain sets
 FIRST_STEP = 0.1  # initial step of the logarithm of every bandwidth
 SEARCH_TOLERANCE = 2e-3  # step and relative error at the end of the search
 SEEDS = 3  # flights of each candidate, to average over the noise
-JUDGING_AXES = {
-    "altitude": ("z",),
-    "yaw": ("yaw",),
-    "attitude": ("x", "y"),
-    "position": ("x", "y"),
-}  # axes whose errors judge a bandwidth
+# Axes whose errors judge a bandwidth.
+JUDGING_AXES = {"altitude": ("z",), "yaw": ("yaw",), "attitude": ("x", "y"), "position": ("x", "y")}
 MIN_RMSE = 1e-6  # [m], [rad] axes with smaller errors are not excited and not judged
 
 

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from lapwing.studies.view3d.bodies import Body
-from lapwing.studies.view3d.solids import Solid, join_meshes, raise_point, rod
+from lapwing.studies.view3d.solids import Solid, disc, join_meshes
 from lapwing.studies.view3d.surroundings import add_solid
 
 OPACITY, STEP = 0.4, 0.1  # largest opacity, and its quantisation
@@ -17,10 +17,7 @@ class Ghost:
 
     def __init__(self, scene: Any, body: Body, colour: str, name: str):
         """Add the nodes, hidden."""
-        discs = [
-            rod(raise_point(r.hub, 0.05 * r.radius), raise_point(r.hub, 0.06 * r.radius), r.radius, "")
-            for r in body.rotors
-        ]
+        discs = [disc(rotor.hub, rotor.radius, "") for rotor in body.rotors]
         solids = [solid for solid in (*body.solids, *discs) if len(solid.faces)]
         self._opacity, self._mesh = 0.0, None
         scene.add_frame(name, show_axes=False)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from lapwing.studies.view3d.bodies import Rotor
-from lapwing.studies.view3d.solids import Solid, arrow, merge, raise_point, rod
+from lapwing.studies.view3d.solids import Solid, arrow, disc, merge
 from lapwing.studies.view3d.surroundings import add_solid
 
 BLADE, THRUST = "#20262B", "#009E73"
@@ -28,11 +28,7 @@ class Rotors:
         self._sent: dict[str, bytes] = {}
         up = 0.05 * self._radii
         self._blade_hubs = self._hubs + np.column_stack([0.0 * up, 0.0 * up, 1.2 * up])
-        discs = [
-            rod(raise_point(hub, 0.05 * r), raise_point(hub, 0.06 * r), r, colour, 0.28)
-            for hub, r in zip(self._hubs, self._radii, strict=True)
-        ]
-        add_solid(scene, f"{body}/discs", merge(discs)[0])
+        add_solid(scene, f"{body}/discs", merge(disc(rotor.hub, rotor.radius, colour, 0.28) for rotor in rotors)[0])
         initial = self._blade_vertices(np.zeros(len(rotors)))
         faces = np.concatenate([_BLADE_FACES + len(_OUTLINE) * k for k in range(len(rotors))])
         self._blades = add_solid(scene, f"{body}/blades", Solid(initial, faces, BLADE, open=True))

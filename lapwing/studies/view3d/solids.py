@@ -26,9 +26,9 @@ class Solid(NamedTuple):
     open: bool = False  # visible from both sides; a translucent mesh is drawn twice
 
 
-def box(centre: Point, size: Point, colour: str, opacity: float = 1.0) -> Solid:
+def box(centre: Point, size: Point, colour: str) -> Solid:
     """Return a box with a centre and edges along x, y, z [m]."""
-    return Solid(_CORNERS * np.asarray(size, float) + np.asarray(centre, float), _BOX, colour, opacity)
+    return Solid(_CORNERS * np.asarray(size, float) + np.asarray(centre, float), _BOX, colour)
 
 
 def rod(start: Point, stop: Point, radius: float, colour: str, opacity: float = 1.0, sides: int = SIDES) -> Solid:
@@ -43,6 +43,11 @@ def rod(start: Point, stop: Point, radius: float, colour: str, opacity: float = 
     x /= np.linalg.norm(x)
     frame = np.stack([x, np.cross(z, x), z])
     return upright._replace(vertices=upright.vertices @ frame + np.asarray(start, float))
+
+
+def disc(hub: Point, radius: float, colour: str, opacity: float = 1.0) -> Solid:
+    """Return the disc of a rotor about z, slightly above its hub."""
+    return rod(raise_point(hub, 0.05 * radius), raise_point(hub, 0.06 * radius), radius, colour, opacity)
 
 
 def ball(centre: Point, radius: float, colour: str, opacity: float = 1.0, sides: int = SIDES) -> Solid:

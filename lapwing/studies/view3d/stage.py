@@ -82,9 +82,8 @@ class Vehicle:
         means = [(float(thrust.mean()), radius) for thrust, radius in result if len(thrust)]
         return 1.6 * max(radius for _, radius in means) / max(mean for mean, _ in means) if means else 0.02
 
-    def _arrow(self, name: str, colour: str, radius: float, opacity: float = 1.0) -> Any:
-        handle = add_solid(self._scene, name, arrow(colour, radius, opacity), visible=False)
-        return handle
+    def _arrow(self, name: str, colour: str, radius: float) -> Any:
+        return add_solid(self._scene, name, arrow(colour, radius), visible=False)
 
     def _node(self, name: str, make: Any) -> Any:
         if name not in self._optional:

@@ -22,12 +22,7 @@ class Constants(NamedTuple):
     failing: tuple[str, ...] = ()  # units whose failures may be injected
     rotors: int = 4
     imus: int = 1
-
-    @property
-    def has_gps(self) -> bool:
-        """True unless SYS_HAS_GPS was 0 at the start."""
-        parameter = self.parameters.get("SYS_HAS_GPS")  # absent from former logs
-        return parameter is None or parameter.default != 0.0
+    has_gps: bool = True
 
 
 class CommanderInput(NamedTuple):

@@ -44,11 +44,7 @@ def time_without_changes(context: Context) -> float:
 
 @always_inline
 def needs_wakeup(
-    thresholds: BatteryThresholds,
-    health: int,
-    battery_charge: float,
-    failed_motor: int,
-    estimate_due: bool,
+    thresholds: BatteryThresholds, health: int, battery_charge: float, failed_motor: int, estimate_due: bool
 ) -> bool:
     """Return True if the commander must run at this tick although its last output is still valid.
 

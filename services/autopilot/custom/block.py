@@ -12,7 +12,7 @@ from lapwing.kernels import always_inline, python_function
 from lapwing.kernels.cell import read
 from lapwing.kernels.codegen import generic
 from lapwing.services.autopilot import motor_failure
-from lapwing.services.autopilot.block import Controller, block_outputs
+from lapwing.services.autopilot.block import Controller, block_outputs, start_step
 from lapwing.services.autopilot.custom.controller_output import (
     NO_WRENCH,
     ControllerOutput,
@@ -92,13 +92,9 @@ def step(
 ) -> tuple[CustomState, tuple, int]:
     """Compute the motor command at `tick`."""
     c = p.common
-    e, order, battery = inputs[0].value, inputs[1].value, inputs[2]
-    setpoint = inputs[3].value if order.follow else order.setpoint
-    landed, detector, still_from = s.landed_state, s.failure_detector, s.still_from
-    if order.restart_at == tick:
-        landed, still_from = INITIAL_LANDED_STATE, tick + c.bounce
-        detector = motor_failure.start(c.failure_detector.value)
-    charge = battery.value.charge if battery.due else s.charge
+    i = start_step(c, s, tick, inputs)
+    e, setpoint = i.estimate, i.setpoint
+    landed = INITIAL_LANDED_STATE if i.restarts else s.landed_state
     landed = update_landed_state(landed, c.law.value.resting_height, e, setpoint, c.interval)
     own, held, no_voltage = s.own, s.held, zero_thrust(c.law.value.shares[0])
     if landed.name != FLYING:
@@ -106,7 +102,7 @@ def step(
     elif tick % p.every == 0:
         own, held = _call_user_step(p.own, own, tick * c.interval, e, setpoint, inputs[4:], no_voltage)
     motor_command = command(
-        c.law.value, p.lift, p.moments, p.voltage_max, held, setpoint.yaw, landed.name, detector.failed
+        c.law.value, p.lift, p.moments, p.voltage_max, held, setpoint.yaw, landed.name, i.failure_detector.failed
     )
-    detector, outputs = block_outputs(c, detector, still_from, charge, order, e, setpoint, landed.name, motor_command)
-    return CustomState(landed, own, held, detector, still_from, charge), outputs, CONTINUE
+    detector, outputs = block_outputs(c, i, landed.name, motor_command)
+    return CustomState(landed, own, held, detector, i.still_from, i.charge), outputs, CONTINUE

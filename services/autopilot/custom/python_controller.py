@@ -25,12 +25,7 @@ class PythonControllerBlock(PeriodicBlock):
     name = "autopilot.controller"
 
     def __init__(
-        self,
-        code: CustomCode,
-        module: ModuleType,
-        construct: Callable[[], Any],
-        reference: str,
-        vehicle: VehicleModel,
+        self, code: CustomCode, module: ModuleType, construct: Callable[[], Any], reference: str, vehicle: VehicleModel
     ):
         """Create the block; the controller is constructed at every take-off.
 

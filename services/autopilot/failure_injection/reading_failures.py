@@ -6,7 +6,6 @@ from typing import Any, NamedTuple
 from lapwing.dynamics.noise import Key
 from lapwing.kernels import DispatchTable, always_inline
 from lapwing.services.autopilot.failure_injection.failure_state import garbage
-from lapwing.services.common.failure_types import Faults
 from lapwing.services.common.ports import (
     AirspeedReading,
     BarometerReading,
@@ -29,14 +28,9 @@ FLOWS, DYNAMICS = 10.0, 1500.0  # [rad/s], [Pa] ranges of garbage, both signs
 class Failure(NamedTuple):
     """Failures of one kind of sensor."""
 
-    kind: Callable[[Faults], int]  # failure type
+    field: str  # of `Faults`, with the failure type
     wrong: Callable[[Any], Any]  # wrong reading
     garbage: Callable[[Any, Key, int], Any]  # random reading at a tick
-
-
-@always_inline
-def _barometer_kind(faults: Faults) -> int:
-    return faults.barometer
 
 
 @always_inline
@@ -50,11 +44,6 @@ def _garbage_barometer(r: BarometerReading, key: Key, tick: int) -> BarometerRea
 
 
 @always_inline
-def _distance_kind(faults: Faults) -> int:
-    return faults.distance_sensor
-
-
-@always_inline
 def _wrong_distance(r: DistanceReading) -> DistanceReading:
     return DistanceReading(r.range + EXCESS_RANGE, r.variance, r.valid)
 
@@ -62,11 +51,6 @@ def _wrong_distance(r: DistanceReading) -> DistanceReading:
 @always_inline
 def _garbage_distance(r: DistanceReading, key: Key, tick: int) -> DistanceReading:
     return DistanceReading(abs(garbage(key, tick, 0, RANGES)[0]), r.variance, r.valid)
-
-
-@always_inline
-def _flow_kind(faults: Faults) -> int:
-    return faults.optical_flow
 
 
 @always_inline
@@ -81,11 +65,6 @@ def _garbage_flow(r: OpticalFlowReading, key: Key, tick: int) -> OpticalFlowRead
 
 
 @always_inline
-def _airspeed_kind(faults: Faults) -> int:
-    return faults.airspeed
-
-
-@always_inline
 def _wrong_airspeed(r: AirspeedReading) -> AirspeedReading:
     return AirspeedReading(r.pressure + EXCESS_DYNAMIC, r.variance, r.valid)
 
@@ -96,11 +75,6 @@ def _garbage_airspeed(r: AirspeedReading, key: Key, tick: int) -> AirspeedReadin
 
 
 @always_inline
-def _magnetometer_kind(faults: Faults) -> int:
-    return faults.magnetometer
-
-
-@always_inline
 def _wrong_magnetometer(r: MagnetometerReading) -> MagnetometerReading:
     return MagnetometerReading((-r.field_body[1], r.field_body[0], r.field_body[2]), r.variance, r.valid)  # by 90 deg
 
@@ -108,11 +82,6 @@ def _wrong_magnetometer(r: MagnetometerReading) -> MagnetometerReading:
 @always_inline
 def _garbage_magnetometer(r: MagnetometerReading, key: Key, tick: int) -> MagnetometerReading:
     return MagnetometerReading(garbage(key, tick, 0, FIELDS), r.variance, r.valid)
-
-
-@always_inline
-def _gps_kind(faults: Faults) -> int:
-    return faults.gps
 
 
 @always_inline
@@ -134,9 +103,9 @@ def _garbage_gps(r: GpsReading, key: Key, tick: int) -> GpsReading:
 
 FAILURES = DispatchTable()
 """Failures by reading class."""
-FAILURES[BarometerReading] = Failure(_barometer_kind, _wrong_barometer, _garbage_barometer)
-FAILURES[DistanceReading] = Failure(_distance_kind, _wrong_distance, _garbage_distance)
-FAILURES[MagnetometerReading] = Failure(_magnetometer_kind, _wrong_magnetometer, _garbage_magnetometer)
-FAILURES[GpsReading] = Failure(_gps_kind, _wrong_gps, _garbage_gps)
-FAILURES[OpticalFlowReading] = Failure(_flow_kind, _wrong_flow, _garbage_flow)
-FAILURES[AirspeedReading] = Failure(_airspeed_kind, _wrong_airspeed, _garbage_airspeed)
+FAILURES[BarometerReading] = Failure("barometer", _wrong_barometer, _garbage_barometer)
+FAILURES[DistanceReading] = Failure("distance_sensor", _wrong_distance, _garbage_distance)
+FAILURES[MagnetometerReading] = Failure("magnetometer", _wrong_magnetometer, _garbage_magnetometer)
+FAILURES[GpsReading] = Failure("gps", _wrong_gps, _garbage_gps)
+FAILURES[OpticalFlowReading] = Failure("optical_flow", _wrong_flow, _garbage_flow)
+FAILURES[AirspeedReading] = Failure("airspeed", _wrong_airspeed, _garbage_airspeed)

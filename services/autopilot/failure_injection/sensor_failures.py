@@ -24,8 +24,7 @@ class SensorInjection(NamedTuple):
 @generic(inline=True)
 def kind_of(faults: types.Type, r: types.Type) -> Callable:
     """Return the failure type of the sensor of `r`."""
-    kind = FAILURES[r.instance_class].kind
-    return lambda faults, r: kind(faults)
+    return compile_source("kind_of(faults, r)", {}, f"return faults.{FAILURES[r.instance_class].field}")
 
 
 @generic(inline=True)

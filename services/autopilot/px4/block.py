@@ -6,7 +6,7 @@ from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.kernels import always_inline, python_function
 from lapwing.kernels.cell import read
 from lapwing.services.autopilot import motor_failure
-from lapwing.services.autopilot.block import Controller, block_outputs
+from lapwing.services.autopilot.block import Controller, block_outputs, start_step
 from lapwing.services.autopilot.control import Command
 from lapwing.services.autopilot.land_detector import (
     FLYING,
@@ -46,18 +46,14 @@ def start(p: Px4Controller) -> Px4State:
 def step(p: Px4Controller, s: Px4State, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Px4State, tuple, int]:
     """Compute the motor command at `tick`."""
     c = p.common
-    e, order, battery = inputs[0].value, inputs[1].value, inputs[2]
-    setpoint = inputs[3].value if order.follow else order.setpoint
-    landed, detector, still_from = s.landed_state, s.failure_detector, s.still_from
-    if order.restart_at == tick:
-        landed, still_from = INITIAL_LANDED_STATE, tick + c.bounce
-        detector = motor_failure.start(c.failure_detector.value)
-    charge = battery.value.charge if battery.due else s.charge
+    i = start_step(c, s, tick, inputs)
+    e, setpoint = i.estimate, i.setpoint
+    landed = INITIAL_LANDED_STATE if i.restarts else s.landed_state
     landed = update_landed_state(landed, c.law.value.resting_height, e, setpoint, c.interval)
     if landed.name == FLYING:
-        control_state, command = law.step(p.law.value, s.law, c.interval, e, setpoint, detector.failed)
+        control_state, command = law.step(p.law.value, s.law, c.interval, e, setpoint, i.failure_detector.failed)
     else:
         off = zero_thrust(c.law.value.shares[0])
         control_state, command = law.start(e), Command(off, off, 0.0, 0.0, setpoint.yaw, landed.name == LANDED)
-    detector, outputs = block_outputs(c, detector, still_from, charge, order, e, setpoint, landed.name, command)
-    return Px4State(landed, control_state, detector, still_from, charge), outputs, CONTINUE
+    detector, outputs = block_outputs(c, i, landed.name, command)
+    return Px4State(landed, control_state, detector, i.still_from, i.charge), outputs, CONTINUE

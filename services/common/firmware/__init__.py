@@ -16,7 +16,7 @@ Life cycle of a link:
 
 1. `open(waits)`, before the first tick and outside the time of the run: start the program (`program.Program`) or wait
    for it, and connect. Every wait calls `waits(text)` at least every 0.2 s; it raises if the run is ended. Use
-   `patience.Patience` for time-outs: it does not count time in which the firmware got no CPU. If the firmware does not
+   `program.ProgramLink` for time-outs: it does not count time in which the firmware got no CPU. If it does not
    start or stalls, raise `link.FirmwareError("px4: no HIL_ACTUATOR_CONTROLS for 10 s at t = 3.2 s; ...")`.
 2. `step(tick, read, waits)` every `period` ticks: `read("imu")` returns the port's newest sample as its NamedTuple of
    `services/common/ports.py` (SI, ENU, FLU). Return a `FirmwareOutput`: the firmware's own outputs in its own order

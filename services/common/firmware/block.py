@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port
 from lapwing.services.common.firmware.hold import COMMAND, FirmwareCommand
-from lapwing.services.common.firmware.link import ExchangeLink, FirmwareError, FirmwareLink, FirmwareOutput, Waits
+from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, Link, Waits
 from lapwing.services.common.firmware.setup import FirmwareSetup
 
 NO_MISSION = 1  # MISSION_STATE of MAVLink
@@ -50,11 +50,7 @@ class FirmwareBlock:
     """Python block that steps a link every `period` ticks."""
 
     def __init__(
-        self,
-        name: str,
-        setup: FirmwareSetup,
-        inputs: tuple[InputPort, ...],
-        create: Callable[[FirmwareSetup], FirmwareLink | ExchangeLink],
+        self, name: str, setup: FirmwareSetup, inputs: tuple[InputPort, ...], create: Callable[[FirmwareSetup], Link]
     ):
         """Create the block; `create` is the class of the link."""
         self.name, self.inputs = f"{name}.link", inputs

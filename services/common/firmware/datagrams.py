@@ -9,6 +9,7 @@ import numpy as np
 
 from lapwing.kernels import always_inline
 from lapwing.kernels.native_calls import address_of, call_long
+from lapwing.services.common.firmware.link import FirmwareError
 
 SIZE = 2048  # [bytes] largest datagram
 WAIT = 0.2  # [s] of one wait for a datagram
@@ -136,6 +137,21 @@ class DatagramSocket:
     def answer_sender(self) -> None:
         """Make the sender of the last datagram the other end."""
         self.memory.peer[:] = self.memory.sender
+
+
+def bound_socket(firmware: str, host: str, port: int, advice: str) -> socket.socket:
+    """Return a UDP socket that is bound to a port.
+
+    Raises:
+        FirmwareError: the port is in use; the text ends with `advice`.
+    """
+    result = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+    try:
+        result.bind((host, port))
+    except OSError as error:
+        result.close()
+        raise FirmwareError(f"{firmware}: cannot listen on udp {host}:{port} ({error.strerror}); {advice}") from None
+    return result
 
 
 def _host_and_port(address: np.ndarray) -> tuple[str, int]:

@@ -72,7 +72,7 @@ class LinkReport:
         return f"{' '.join(filter(None, (self.firmware, self.version)))}: {', '.join(parts)}"
 
 
-class FirmwareLink(Protocol):
+class Link(Protocol):
     """Connection to one running firmware. See the package for the order of the calls."""
 
     report: LinkReport
@@ -83,9 +83,6 @@ class FirmwareLink(Protocol):
     def open(self, waits: Waits) -> None:
         """Start the firmware or wait for it, and connect."""
 
-    def step(self, tick: int, read: Read, waits: Waits) -> FirmwareOutput:
-        """Send the samples at `tick`, and return the firmware's outputs."""
-
     def cpu(self) -> float:
         """Return the CPU time [s] that the firmware has used, 0 if this link has not started it."""
 
@@ -93,14 +90,17 @@ class FirmwareLink(Protocol):
         """Close the connection, and end the program if this link has started it."""
 
 
-class ExchangeLink(Protocol):
-    """Connection to one running firmware, with which compiled code exchanges samples and outputs (`exchange`)."""
+class FirmwareLink(Link, Protocol):
+    """Link that Python code steps."""
 
-    report: LinkReport
+    def step(self, tick: int, read: Read, waits: Waits) -> FirmwareOutput:
+        """Send the samples at `tick`, and return the firmware's outputs."""
+
+
+class ExchangeLink(Link, Protocol):
+    """Link with which compiled code exchanges samples and outputs (`exchange`)."""
+
     outputs: int  # number of outputs
-
-    def __init__(self, setup: FirmwareSetup) -> None:
-        """Store the configuration; open nothing."""
 
     def exchange(self, shared: Any, ring: Callable[[str], Any]) -> Any:
         """Return the parameters of the compiled exchange.
@@ -110,9 +110,6 @@ class ExchangeLink(Protocol):
             ring: returns the `InputRing` of a port.
         """
 
-    def open(self, waits: Waits) -> None:
-        """Start the firmware or wait for it, and connect."""
-
     def handle_call(self, tick: int, reason: int, number: int, read: Read, waits: Waits) -> FirmwareOutput | None:
         """Handle a call from compiled code at `tick`: wait for outputs, send again, or poll the MAVLink link.
 
@@ -121,14 +118,8 @@ class ExchangeLink(Protocol):
             reason: WAIT, SEND, POLL or INVALID of `exchange`.
             number: for WAIT, size [bytes] of the datagram that compiled code received.
             read: returns the newest sample of a port.
-            waits: see `FirmwareLink.step`.
+            waits: see `Waits`.
 
         Returns:
             The state of the vehicle without outputs after a poll, otherwise None.
         """
-
-    def cpu(self) -> float:
-        """Return the CPU time [s] that the firmware has used, 0 if this link has not started it."""
-
-    def close(self) -> None:
-        """Close the connection, and end the program if this link has started it."""

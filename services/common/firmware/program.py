@@ -11,8 +11,9 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NoReturn
 
+from lapwing.cosim.processes.patience import Patience
 from lapwing.services.common.firmware.link import FirmwareError
 from lapwing.services.common.firmware.setup import FirmwareSetup
 
@@ -118,6 +119,34 @@ class Program:
         self._output.close()
         if self._temporary:
             self._temporary.cleanup()
+
+
+class ProgramLink:
+    """Base class of links that start the firmware's program, unless the user starts it."""
+
+    _setup: FirmwareSetup
+    _program: Program | None = None
+    _time = 0.0  # [s] simulation time
+
+    def cpu(self) -> float:
+        """Return the CPU time [s] of the program, 0 if Lapwing has not started it."""
+        return self._program.cpu() if self._program else 0.0
+
+    def _patience(self, timeout: float) -> Patience:
+        return Patience(timeout, self._program.pid if self._program else None)
+
+    def _check_program(self) -> None:
+        if self._program:
+            self._program.check(f" at t = {self._time:.3f} s")
+
+    def _check(self, patience: Patience, problem: str, advice: str) -> None:
+        """Raise FirmwareError if the program has ended or the time-out has passed."""
+        self._check_program()
+        if patience.over:
+            self._fail(f"{problem} for {patience.timeout:g} s", advice)
+
+    def _fail(self, problem: str, advice: str) -> NoReturn:
+        raise FirmwareError(f"{self._setup.firmware}: {problem} at t = {self._time:.3f} s; {advice}")
 
 
 def _end_with_parent() -> None:

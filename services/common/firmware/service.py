@@ -10,22 +10,18 @@ from lapwing.cosim.diagram.tick_schedule import InputPort
 from lapwing.kernels.cell import Cell
 from lapwing.messages import topics as topic
 from lapwing.services.common import ports
-from lapwing.services.common.command_encoder import actuators_encoder, status_encoder
+from lapwing.services.common.encoders import actuators_encoder, setpoint_encoder, status_encoder
 from lapwing.services.common.firmware.block import FirmwareBlock
 from lapwing.services.common.firmware.exchange_block import ExchangeBlock
 from lapwing.services.common.firmware.hold import COMMAND, HeldState, Hold
 from lapwing.services.common.firmware.hold_reference import HoldReference
-from lapwing.services.common.firmware.link import ExchangeLink, FirmwareLink
+from lapwing.services.common.firmware.link import Link
 from lapwing.services.common.firmware.playback import TOPICS, Playback, Recorded
 from lapwing.services.common.firmware.setup import FirmwareSetup
-from lapwing.services.common.setpoint_encoder import setpoint_encoder
 
 
 def firmware_service(
-    setup: RunConfig,
-    name: str,
-    create: Callable[[FirmwareSetup], FirmwareLink | ExchangeLink],
-    recorded: Recorded | None = None,
+    setup: RunConfig, name: str, create: Callable[[FirmwareSetup], Link], recorded: Recorded | None = None
 ) -> Service:
     """Return the service of an adapter.
 

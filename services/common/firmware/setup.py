@@ -9,7 +9,7 @@ from lapwing.cosim.run_errors import LockStepError
 from lapwing.cosim.scene import Scene
 from lapwing.services.common import ports
 from lapwing.services.common.communication_schema import Communication, Rates, ticks
-from lapwing.services.common.firmware.motor_order import Output, motor_order
+from lapwing.services.common.firmware.motor_order import QUADROTOR_X, motor_order
 from lapwing.services.common.firmware.schema import TABLE
 from lapwing.services.common.ports import AutopilotStatus, MotorCommand, Setpoint
 from lapwing.services.common.run_schema import follows_trajectory
@@ -49,16 +49,13 @@ class FirmwareSetup(NamedTuple):
         return self.port or default + stride * max(self.instance, 0)
 
 
-def firmware_config(
-    scene: Scene, inputs: tuple[str, ...], period: int, layout: tuple[Output, ...], own: Any = None
-) -> ServiceConfig:
+def firmware_config(scene: Scene, inputs: tuple[str, ...], period: int, own: Any) -> ServiceConfig:
     """Return the configuration of an adapter.
 
     Args:
         scene: resolved scene whose `autopilot.firmware` is the adapter's.
         inputs: ports that the firmware consumes, without the battery and the trajectory, which every adapter gets.
         period: [ticks] between two exchanges.
-        layout: position and spin direction of each output of the firmware.
         own: the adapter's own resolved values, a NamedTuple.
 
     Raises:
@@ -79,7 +76,7 @@ def firmware_config(
         table.step_timeout,
         dict(table.parameters),
         table.parameter_text,
-        motor_order(frame, layout, table.firmware),
+        motor_order(frame, QUADROTOR_X, table.firmware),
         frame.motor.max_voltage,
         start_place(scene),
         exchange.interval,

@@ -5,7 +5,7 @@ from typing import Any
 
 from lapwing.services.common.mavlink.extra_messages import mavlink
 
-__all__ = ["id_of", "mavlink", "message_class", "name_of"]
+__all__ = ["id_of", "mavlink", "message_class"]
 
 
 @cache
@@ -16,12 +16,6 @@ def _ids() -> dict[str, int]:
 def id_of(name: str) -> int | None:
     """Return the number of a message. Return None if the dialect lacks it."""
     return _ids().get(name)
-
-
-def name_of(number: int) -> str | None:
-    """Return the name of a message. Return None if the dialect lacks it."""
-    message: Any = mavlink.mavlink_map.get(number)
-    return message.msgname if message else None
 
 
 def message_class(name: str) -> Any:

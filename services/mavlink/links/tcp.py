@@ -6,10 +6,8 @@ from typing import ClassVar
 
 from lapwing.services.common.address import is_loopback
 from lapwing.services.mavlink.links.byte_stream import ByteStream
-from lapwing.services.mavlink.links.link import Link, socket_address
+from lapwing.services.mavlink.links.link import MAX_ENDPOINTS, Link, socket_address
 from lapwing.services.mavlink.links.receiver import Receiver
-
-MAX_ENDPOINTS = 8
 
 
 class TcpIn(Link):

@@ -6,10 +6,9 @@ from selectors import EVENT_READ, BaseSelector
 from typing import ClassVar
 
 from lapwing.services.common.address import is_loopback
-from lapwing.services.mavlink.links.link import PIECE, ROUND, Link, socket_address
+from lapwing.services.mavlink.links.link import MAX_ENDPOINTS, PIECE, ROUND, Link, socket_address
 from lapwing.services.mavlink.links.receiver import Endpoint, Receiver
 
-MAX_ENDPOINTS = 8
 SILENT = 10.0  # [s] of wall time without a message after which another endpoint may replace it
 
 Address = tuple[str, int]

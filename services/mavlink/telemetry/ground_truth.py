@@ -52,8 +52,4 @@ def _to_body(q: tuple[float, float, float, float], a: tuple[float, float, float]
     # v' = v - 2 u x (w v - u x v) with u the vector part: the inverse rotation
     c = (y * a[2] - z * a[1], z * a[0] - x * a[2], x * a[1] - y * a[0])
     d = (w * a[0] - c[0], w * a[1] - c[1], w * a[2] - c[2])
-    return (
-        a[0] - 2.0 * (y * d[2] - z * d[1]),
-        a[1] - 2.0 * (z * d[0] - x * d[2]),
-        a[2] - 2.0 * (x * d[1] - y * d[0]),
-    )
+    return (a[0] - 2.0 * (y * d[2] - z * d[1]), a[1] - 2.0 * (z * d[0] - x * d[2]), a[2] - 2.0 * (x * d[1] - y * d[0]))

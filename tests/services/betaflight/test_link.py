@@ -122,7 +122,7 @@ def test_used_port_is_reported(tmp_path):
     first = free_ports()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", first))
-        with pytest.raises(FirmwareError, match=rf"UDP port {first} of 127.0.0.1 cannot be opened .*end the other"):
+        with pytest.raises(FirmwareError, match=rf"cannot listen on udp 127.0.0.1:{first} .*end the other"):
             fly_single(setup(first), tmp_path / "flight.mcap")
 
 

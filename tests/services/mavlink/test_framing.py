@@ -64,7 +64,7 @@ def test_every_message_of_dialect_has_bytes_of_pymavlink():
 
 @pytest.mark.parametrize("signature", [None, Signature(bytes(32))], ids=["unsigned", "signed"])
 def test_channel_numbers_its_frames_and_codec_reads_them(signature):
-    channel, reader = Channel(SYSTEM, signature, True, Counter()), mavlink.MAVLink(None, 255, 190)
+    channel, reader = Channel((SYSTEM, 1), signature, True, Counter()), mavlink.MAVLink(None, 255, 190)
     if signature:
         reader.signing.secret_key = bytes(32)
     for k in range(300):
@@ -77,7 +77,7 @@ def test_channel_numbers_its_frames_and_codec_reads_them(signature):
 @pytest.mark.parametrize("signature", [None, Signature(bytes(32))], ids=["unsigned", "signed"])
 def test_number_beyond_float_of_32_bits_is_not_sent_and_counted(signature):
     counts = Counter()
-    channel = Channel(SYSTEM, signature, True, counts)
+    channel = Channel((SYSTEM, 1), signature, True, counts)
     assert channel.encode(mavlink.MAVLink_attitude_message(0, 1e39, 0.0, 0.0, 0.0, 0.0, 0.0)) == b""
     assert counts.total() == 1
     (actual,) = mavlink.MAVLink(None, 255, 190).parse_buffer(

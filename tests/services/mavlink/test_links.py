@@ -9,8 +9,8 @@ import pytest
 from fake_vehicle import flying, free_port, until
 
 from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.mavlink.link_server import Pacing
 from lapwing.services.mavlink.links.link import Budget
-from lapwing.services.mavlink.telemetry_timing import Pacing
 
 
 def frame():

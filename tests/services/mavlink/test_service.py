@@ -15,7 +15,7 @@ import pytest
 from fake_vehicle import FakeVehicle, free_port, until
 from pymavlink import mavutil
 
-from lapwing.cosim.diagram.block_diagram import to_record_batches
+from lapwing.cosim.diagram.topic_encoder import to_record_batches
 from lapwing.cosim.log import LogReader, LogWriter
 from lapwing.cosim.transport.packets import pack_log_packet
 from lapwing.messages import Status, header

@@ -13,8 +13,7 @@ from lapwing.services.common.vehicle_schema import Effects
 from lapwing.services.scene_resolver import load
 from lapwing.studies.effects import console_output, procedure
 from lapwing.studies.effects.cost import Cost
-from lapwing.studies.effects.influence import Influence, influence
-from lapwing.studies.effects.procedure import Row, Study, _smallest
+from lapwing.studies.effects.procedure import Influence, Row, Study, _smallest, influence
 from lapwing.studies.effects.procedure import study as run_study
 from lapwing.studies.effects.variants import check_effects, variant
 from lapwing.studies.simulate import fly

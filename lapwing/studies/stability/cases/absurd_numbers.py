@@ -5,8 +5,7 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram, Service
-from lapwing.cosim.diagram.tick_schedule import Port
+from lapwing.cosim.diagram.block_diagram import BlockDiagram, ExternalBlock, Service
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.dynamics.integrators import check_start
 from lapwing.dynamics.vehicles.rigid_body import FreeBodyParameters, RigidBody
@@ -29,22 +28,6 @@ KEYS = (
 )  # fmt: skip
 SHORT = ("run.duration=0.2",)
 TICKS = 20
-
-
-class CommandSource:
-    """Placeholder of the autopilot: the case sets its outputs."""
-
-    name = "case.commands"
-
-    def __init__(self, *outputs: Port):
-        self.outputs = outputs
-
-    def bind(self, graph: BlockDiagram) -> None:
-        """Do nothing."""
-
-    def on_tick(self, tick: int) -> int:
-        """Do nothing."""
-        return NEVER
 
 
 def reaction_to_parameter(value: float, key: str) -> str:
@@ -87,7 +70,9 @@ def reaction_to_voltage(value: float) -> tuple[str, float]:
     """Return (reaction of a plant to a voltage at tick 10, largest absolute value in its output before)."""
     setup = resolve(load("hover", SHORT))
     outputs = [setup.port(ports.ACTUATORS), setup.port(ports.STATUS)]
-    graph = BlockDiagram(setup, [create(setup, "plant"), Service("case", [CommandSource(*outputs)], [])], 2 * TICKS)
+    graph = BlockDiagram(
+        setup, [create(setup, "plant"), Service("case", [ExternalBlock("case.commands", *outputs)], [])], 2 * TICKS
+    )
     like = setup.port(ports.ACTUATORS).like
     last = 0
     try:

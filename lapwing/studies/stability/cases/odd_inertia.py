@@ -11,10 +11,7 @@ from lapwing.studies.stability.sampled_runs import drift, run_fixed_steps
 
 HARD = "a needle (one moment a millionth of the others), a flat plate, a body spherical to 1e-9"
 
-BODIES = {
-    "needle": ((1e-6, 1.0, 1.0 + 7e-7), (400.0, 1.0, -0.7)),
-    "flat": ((1e-6, 1.0, 1.0 + 1e-6), (50.0, -0.3, 2.0)),
-}
+BODIES = {"needle": ((1e-6, 1.0, 1.0 + 7e-7), (400.0, 1.0, -0.7)), "flat": ((1e-6, 1.0, 1.0 + 1e-6), (50.0, -0.3, 2.0))}
 ATTITUDE = exp((0.3, -0.5, 0.2))
 SPHERICAL, RATES = (1.0, 1.0 + 1e-9, 1.0 + 2e-9), (1.0, 2.0, 5.0)
 DURATION, STEPS, SAMPLES = 100.0, 100_000, 200

@@ -9,7 +9,7 @@ from pymavlink.dialects.v20 import all as mavlink
 from lapwing.dynamics.geodesy import Home
 from lapwing.messages import MissionItem, Vector3
 from lapwing.services.ardupilot import modes as ardupilot
-from lapwing.services.common.firmware.flight_status import FlightStatus
+from lapwing.services.common.firmware.flight_status import poll_flight
 from lapwing.services.common.firmware.link import FirmwareError
 from lapwing.services.common.firmware.mission import mission_messages
 from lapwing.services.common.firmware.mission_client import REJECTIONS, MissionClient, Stage
@@ -161,7 +161,7 @@ def test_rejected_mission_ends_run():
     client = make(vehicle)
     fly(vehicle, client, REJECTIONS + 5.0)
     with pytest.raises(FirmwareError, match=r"px4: the mission is rejected \(mav_mission_no_space\)"):
-        FlightStatus("px4", client).poll(30.0)
+        poll_flight("px4", client, 30.0)
 
 
 def test_disarming_finishes_flight_and_failsafe_is_reported():
@@ -170,12 +170,10 @@ def test_disarming_finishes_flight_and_failsafe_is_reported():
     fly(vehicle, client, 3.0)
     vehicle.beat()
     vehicle.emit(mavlink.MAVLink_statustext_message(3, b"Failsafe activated: RTL\t"))
-    client.poll(3.5)
-    assert FlightStatus("px4", client).output((0.5,) * 4, True).text == "Failsafe activated: RTL"
+    assert poll_flight("px4", client, 3.5).text == "Failsafe activated: RTL"
     vehicle.armed = False
     vehicle.beat()
-    client.poll(4.0)
-    assert FlightStatus("px4", client).output((0.0,) * 4, False).finished
+    assert poll_flight("px4", client, 4.0).finished
 
 
 def test_restarted_firmware_gets_mission_and_is_armed():
@@ -244,4 +242,4 @@ def test_version_of_firmware_is_requested():
     assert [m.param1 for m in requested] == [148.0]
     vehicle.emit(mavlink.MAVLink_autopilot_version_message(0, 0x01110080, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0))
     client.poll(0.1)
-    assert FlightStatus("px4", client).version == "1.17.0"
+    assert client.version == "1.17.0"

@@ -4,7 +4,7 @@ import struct
 
 import pytest
 
-from lapwing.services.px4.failsafe_events import event_id, failsafe_text
+from lapwing.services.px4.modes import event_id, failsafe_text
 
 NUMBERS = {
     "commander_failsafe_enter": 9751178,

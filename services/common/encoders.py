@@ -1,17 +1,40 @@
-"""Topic encoders of motor commands and autopilot status."""
+"""Topic encoders of motor commands, autopilot status and setpoints."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
+from lapwing import messages
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
 from lapwing.messages import Actuators, Status, Vector3, header
 from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import stamp_columns
+from lapwing.messages.topics import Topic
 from lapwing.services.common import ports
-from lapwing.services.common.ports import AutopilotStatus, MotorCommand
+from lapwing.services.common.ports import AutopilotStatus, MotorCommand, Setpoint
+
+
+def setpoint_encoder(topic: Topic, port: str, texts: Sequence[str]) -> TopicEncoder:
+    """Return the encoder of a setpoint port; `texts` has the phase names by index and may grow."""
+
+    def sample(phase: int) -> Any:
+        return messages.Setpoint(messages.header(0, "world"), phase=texts[phase])
+
+    return TopicEncoder(topic, port, 1, _setpoint, sample, lambda x: [x.phase])
+
+
+def _setpoint(x: Setpoint, time_ns: np.ndarray) -> Fields:
+    return {
+        **stamp_columns(time_ns),
+        "position": x.position_world,
+        "velocity": x.velocity_world,
+        "acceleration": x.acceleration_world,
+        "yaw": x.yaw,
+        "yaw_rate": x.yaw_rate,
+        "final": x.final,
+    }
 
 
 def actuators_encoder(port: Port) -> TopicEncoder:
