@@ -23,8 +23,8 @@ from lapwing.services.common.firmware.exchange import INVALID, LAST_START, POLL,
 from lapwing.services.common.firmware.flight_status import FlightStatus
 from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, LinkReport, Read, Waits
 from lapwing.services.common.firmware.mavlink_transport import TcpTransport
-from lapwing.services.common.firmware.mission import mission_items, mission_messages
 from lapwing.services.common.firmware.mission_client import MissionClient
+from lapwing.services.common.firmware.mission_messages import mission_items, mission_messages
 from lapwing.services.common.firmware.patience import Patience
 from lapwing.services.common.firmware.program import Program
 from lapwing.services.common.firmware.setup import FirmwareSetup, first_free
