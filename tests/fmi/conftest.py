@@ -1,31 +1,34 @@
 """FMPy parses each name of a variable once: its parser takes most of the time of a validation."""
 
 import functools
-from collections.abc import Callable
 from typing import Any
 
 import pytest
 
+try:
+    from lark import Lark
+except ImportError:  # FMPy requires it; other tests run without
+    Lark = None
 
-@pytest.fixture(scope="session")
-def name_parser() -> Callable[..., Any]:
-    """Return a replacement of FMPy's parser that passes a legal name once; models of scenes share most names."""
-    original = pytest.importorskip("lark").Lark
 
-    class Parser:
-        def __init__(self, grammar: str, **options: Any):
-            parser = original(grammar, **options)
+class NameParser:
+    """Replacement of FMPy's parser that passes a legal name once; the models of all scenes share most names."""
 
-            @functools.cache  # which keeps no exception
-            def parse(name: str) -> None:
-                parser.parse(name)
+    def __init__(self, grammar: str, **options: Any):
+        parser = Lark(grammar, **options)
 
-            self.parse = parse
+        @functools.cache  # which keeps no exception
+        def parse(name: str) -> None:
+            parser.parse(name)
 
-    return functools.cache(Parser)
+        self.parse = parse
+
+
+one_parser = functools.cache(NameParser)  # of a grammar
 
 
 @pytest.fixture(autouse=True)
-def names_are_parsed_once(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Use `name_parser`."""
-    monkeypatch.setattr("lark.Lark", request.getfixturevalue("name_parser"))
+def names_are_parsed_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Let FMPy use `NameParser`."""
+    if Lark is not None:
+        monkeypatch.setattr("lark.Lark", one_parser)
