@@ -60,7 +60,7 @@ def _written(command):
 def _run(command, key_prefix, folder, before):
     """Run a command once those before it, which began earlier, have written what it reads.
 
-    Videos have a picture per second: each picture of a whole flight takes the same path, and a tenth of a second.
+    Videos have a picture per second instead of twenty: all pictures of a flight take the same path through the code.
     """
     for one in before:
         one.result()
