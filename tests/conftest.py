@@ -5,7 +5,7 @@ import resource
 import hypothesis
 import pytest
 
-SLOWEST = ("test_readme.py", "test_options.py", "test_stress.py", "test_library.py")  # over five minutes each
+SLOWEST = ("test_readme.py", "test_options.py", "test_stress.py", "test_scenes.py", "test_library.py")  # minutes each
 _PEAK = "peak_memory_mb"
 _peaks = pytest.StashKey[dict[str, float]]()
 

@@ -58,11 +58,15 @@ def _written(command):
 
 
 def _run(command, key_prefix, folder, before):
-    """Run a command once those before it, which began earlier, have written what it reads."""
+    """Run a command once those before it, which began earlier, have written what it reads.
+
+    Videos have a picture per second instead of twenty: all pictures of a flight take the same path through the code.
+    """
     for one in before:
         one.result()
     words = shlex.split(command)[1:]
-    more = ["--key-prefix", key_prefix] if words[0] in ("run", "replay") else []
+    own = ["--key-prefix", key_prefix]
+    more = {"run": own, "replay": own, "render": ["--fps", "1"]}.get(words[0], [])
     program = [sys.executable, "-m", "lapwing", *words, *more]
     return subprocess.run(program, cwd=folder, capture_output=True, text=True, timeout=1800)
 

@@ -23,8 +23,8 @@ from lapwing.services.common.firmware.exchange import INVALID, LAST_START, POLL,
 from lapwing.services.common.firmware.flight_status import poll_flight
 from lapwing.services.common.firmware.link import FirmwareOutput, LinkReport, Read, Waits
 from lapwing.services.common.firmware.mavlink_transport import TcpTransport
-from lapwing.services.common.firmware.mission import mission_items, mission_messages
 from lapwing.services.common.firmware.mission_client import MissionClient
+from lapwing.services.common.firmware.mission_messages import mission_items, mission_messages
 from lapwing.services.common.firmware.program import Program, ProgramLink
 from lapwing.services.common.firmware.setup import FirmwareSetup, first_free
 from lapwing.services.common.ports import AirspeedReading, DistanceReading, ImuReading

@@ -5,8 +5,8 @@ from lapwing.services.common import ports
 from lapwing.services.common.firmware.flight_status import poll_flight
 from lapwing.services.common.firmware.link import FirmwareOutput, Read
 from lapwing.services.common.firmware.mavlink_transport import UdpTransport
-from lapwing.services.common.firmware.mission import mission_items, mission_messages
 from lapwing.services.common.firmware.mission_client import MissionClient
+from lapwing.services.common.firmware.mission_messages import mission_items, mission_messages
 from lapwing.services.common.firmware.setup import FirmwareSetup
 from lapwing.services.px4.modes import CONVENTIONS
 

@@ -63,11 +63,13 @@ def check_scipy(modules):
     assert {p for p in parts if not p.startswith("scipy._")} <= {"scipy.linalg", "scipy.version"}  # numba: BLAS
 
 
-def test_scene_is_loaded_without_scipy():
-    """SciPy takes longer to import than a scene takes to load."""
+def test_scene_is_loaded_without_scipy_and_mavlink():
+    """SciPy takes longer to import than a scene takes to load, MAVLink's messages a third of that time."""
     code = "from lapwing.cli.preflight import with_solver_selected as load; load('groundstation', [])"
     command = [sys.executable, "-P", "-c", f"{code}; import sys; print(*sys.modules)"]
-    check_scipy(subprocess.run(command, capture_output=True, text=True, check=True).stdout.split())
+    modules = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()
+    check_scipy(modules)
+    assert not [m for m in modules if m.startswith("pymavlink")]
 
 
 def test_fork_imports_no_resolver_plot_or_console_module(tmp_path):

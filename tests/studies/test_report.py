@@ -15,6 +15,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 import synthetic_flights
+from scipy.spatial.transform import Rotation
 
 from lapwing.cosim.config.provenance import attachments as attachments_of
 from lapwing.cosim.log import LogWriter
@@ -497,6 +498,14 @@ def test_coefficients_are_those_of_propeller(log):
     speed = flight.truth.rotor_speed[:, 0]
     assert propulsion.coefficient(speed, flight.truth.rotor_thrust[:, 0], 2) == pytest.approx(THRUST)
     assert propulsion.coefficient(speed, flight.truth.rotor_torque[:, 0], 2) == pytest.approx(TORQUE)
+
+
+def test_rotation_vectors_are_those_of_scipy():
+    a, b = (Rotation.random(100, random_state=seed).as_quat() for seed in (1, 2))
+    b[:50] *= -1.0  # the same attitudes
+    expected = (Rotation.from_quat(a).inv() * Rotation.from_quat(b)).as_rotvec()
+    assert estimator.rotation_vectors(a, b) == pytest.approx(expected, abs=1e-14)
+    assert not estimator.rotation_vectors(a, a).any()
 
 
 def test_estimate_errors_and_refusals(log):

@@ -17,7 +17,8 @@ from typing import NamedTuple
 from lapwing.kernels.compiler import cache_files
 
 FOLDER = "compiling"
-PATIENCE = 120.0  # [s] after which the compiling process is assumed to be suspended
+PATIENCE = 120.0  # [s] without work of the compiling process after which it is assumed to be suspended
+LONGEST = 1200.0  # [s] to wait in all: of another container with this cache, the work is not known
 LOOK = 0.02  # [s] between two attempts to take the lock
 
 
@@ -42,13 +43,15 @@ def acquire(name: str) -> None:
     """Take the lock of the cache entry `name` and hold it to the end of `release_at_end`.
 
     Another process may have held it until now, so look up the cache entry again afterwards. No lock is taken if the
-    file system has none or if another process holds it too long.
+    file system has none, or if another process holds it for `PATIENCE` without using a processor: on a busy machine
+    compiling takes long, and to compile twice makes it busier.
     """
     base = cache_files.root()
     if base is None:
         return
     path = base / FOLDER / hashlib.blake2b(name.encode(), digest_size=16).hexdigest()
-    until = time.monotonic() + PATIENCE
+    start, work = time.monotonic(), ""
+    until = start + PATIENCE
     with contextlib.suppress(OSError):
         for folder in (base, path.parent):
             folder.mkdir(mode=0o700, parents=True, exist_ok=True)
@@ -57,6 +60,8 @@ def acquire(name: str) -> None:
                 _held.locks.append(Lock(path, _lock(path)))
                 return
             except BlockingIOError:
+                if (now := _work_of_holder(path)) != work:
+                    work, until = now, min(time.monotonic() + PATIENCE, start + LONGEST)
                 time.sleep(LOOK)
 
 
@@ -86,7 +91,17 @@ def _lock(path: Path) -> int:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         if os.fstat(descriptor).st_nlink == 0:  # the previous holder removed the file; the next one creates a new one
             raise BlockingIOError
+        os.write(descriptor, str(os.getpid()).encode())
     except OSError:
         os.close(descriptor)
         raise
     return descriptor
+
+
+def _work_of_holder(path: Path) -> str:
+    """Return the processor time that the process with a lock has used, as text; "" if it is not known."""
+    try:
+        status = Path(f"/proc/{int(path.read_text())}/stat").read_text()
+    except (OSError, ValueError):
+        return ""
+    return " ".join(status.rpartition(")")[2].split()[11:13])  # in user and in system mode

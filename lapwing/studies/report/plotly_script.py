@@ -12,14 +12,16 @@ from importlib.util import find_spec
 from pathlib import Path
 
 TRACES = ("scatter", "bar")  # trace types of `plotly_traces`
-_MODULE = re.compile(r"(?:^|[;\n}])(var ([\w$]+)=W\()")
+_MODULE = re.compile(r"var ([\w$]+)=W\(")  # after one of `_ENDS`; patterns that begin with a text are found fast
+_ENDS = ";\n}"
 _REGISTER = re.compile(
     r"\.register\(\[((?:[\w$]+\(\),?)+)\]\);[\w$]+\.exports=[\w$]+\}\);(?=return ([\w$]+)\(\);\}\)\(\);)"
 )
 _KIND = re.compile(r'moduleType:"trace",name:"(\w+)"')
 _ALIAS = re.compile(r'var [\w$]+=W\(\([\w$,]+\)=>\{"use strict";[\w$]+\.exports=([\w$]+)\(\)\}\);?')
-_INNER = re.compile(r"([\w$]+)=(?:Ea\(|\{\};Fp\()")  # modules in ECMAScript style within one in CommonJS style
+_INNER = re.compile(r"=(?:Ea\(|\{\};Fp\()")  # after names of modules in ECMAScript style within one in CommonJS style
 _NAME = re.compile(r"[\w$]+")
+_LAST_NAME = re.compile(r"[\w$]+\Z")
 
 
 def script() -> str:
@@ -38,7 +40,7 @@ def script() -> str:
 
 def remove_unused_traces(text: str) -> str:
     """Return plotly.js with TRACES only; unchanged if it is not bundled as described above."""
-    starts = [(match.start(1), match[2]) for match in _MODULE.finditer(text)]
+    starts = [(m.start(), m[1]) for m in _MODULE.finditer(text) if text[max(m.start() - 1, 0) : m.start()] in _ENDS]
     register = _REGISTER.search(text)
     if not starts or register is None or register[2] != starts[-1][1]:
         return text
@@ -49,7 +51,7 @@ def remove_unused_traces(text: str) -> str:
     names = [name for name in _NAME.findall(register[1]) if _kind(name, bodies) in TRACES]
     entry = register[2]
     bodies[entry] = bodies[entry].replace(register[1], ",".join(f"{name}()" for name in names))
-    owners = {inner: name for name, body in bodies.items() for inner in _INNER.findall(body)}
+    owners = {inner: name for name, body in bodies.items() for inner in _inner_names(body)}
     owners |= {name: name for name in bodies}
     needed: set[str] = set()
     pending = [entry]
@@ -59,6 +61,12 @@ def remove_unused_traces(text: str) -> str:
             needed.add(name)
             pending += {owners[used] for used in set(_NAME.findall(bodies[name])) if used in owners} - needed
     return text[:first] + "".join(body for name, body in bodies.items() if name in needed) + text[last:]
+
+
+def _inner_names(body: str) -> list[str]:
+    """Return the names of the modules within a module."""
+    before = (_LAST_NAME.search(body, max(match.start() - 99, 0), match.start()) for match in _INNER.finditer(body))
+    return [match[0] for match in before if match]
 
 
 def _kind(name: str, bodies: dict[str, str]) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 from lapwing.services.common.firmware.conventions import Conventions
 from lapwing.services.common.firmware.frame_filter import FrameFilter
 from lapwing.services.common.firmware.mavlink_transport import Transport
-from lapwing.services.common.firmware.mission import item_message, result_name
+from lapwing.services.common.firmware.mission_messages import item_message, result_name
 from lapwing.services.common.firmware.parameter_client import ParameterClient
 from lapwing.services.common.firmware.status_texts import StatusTexts
 from lapwing.services.common.mavlink.dialect import mavlink

@@ -7,15 +7,15 @@ from lapwing.dynamics import geodesy
 from lapwing.dynamics.geodesy import Home
 from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import python_function
-from lapwing.services.common.mavlink.dialect import mavlink
 
 enu_to_geodetic = python_function(geodesy.enu_to_geodetic)  # the link's process has no compiled code
 geodetic_to_enu = python_function(geodesy.geodetic_to_enu)
 
 UNSPECIFIED = 0x7FFFFFFF  # unspecified coordinate of integer messages
 
-ABOVE_SEA = {mavlink.MAV_FRAME_GLOBAL, mavlink.MAV_FRAME_GLOBAL_INT}
-ABOVE_HOME = {mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT, mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT}
+# MAV_FRAME; as numbers, because every command imports this module and few need MAVLink's messages
+ABOVE_SEA = {0, 5}  # GLOBAL, GLOBAL_INT
+ABOVE_HOME = {3, 6}  # GLOBAL_RELATIVE_ALT, GLOBAL_RELATIVE_ALT_INT
 
 
 class Datum(NamedTuple):

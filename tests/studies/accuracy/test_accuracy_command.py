@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from lapwing.studies.accuracy import accuracy_command, console_output
+from lapwing.studies.accuracy.error_budget import SOURCES
 from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
 from lapwing.studies.accuracy.targets import find, scene_of
 from lapwing.studies.accuracy.work_precision import Point, cheapest, check_target, measure, pareto_points
@@ -111,6 +112,23 @@ def test_command_prints_cheapest_method(capsys, tmp_path, monkeypatch):
     result = json.loads((tmp_path / "a.json").read_text())
     assert result["cheapest"]["error"] <= 1e-3
     assert {"rkmk54", "lie_euler", "erk4m"} == {p["method"] for p in result["points"]}
+
+
+@pytest.mark.long
+def test_scene_with_contact_has_error_sources_and_cost(capsys, monkeypatch):
+    problem_of = accuracy_command.scenes.problem
+
+    def two_methods(scene):
+        problem = problem_of(scene)
+        return problem._replace(methods=[m for m in problem.methods if m.name in ("rk4_renormalised", "rkmk4")])
+
+    monkeypatch.setattr(accuracy_command.scenes, "problem", two_methods)
+    result = accuracy_command.study(accuracy_command.console(), "hover", ["run.duration=0.2"], 1e-3)
+    accuracy_command.show(accuracy_command.console(), result)
+    assert result.selected.error <= 1e-3
+    assert min(result.cost) > 0.0
+    assert {part.source for part in result.parts} == set(SOURCES)
+    assert "in contact" in capsys.readouterr().out
 
 
 def test_table_fits_80_columns(capsys):
