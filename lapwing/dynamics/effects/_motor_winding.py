@@ -12,6 +12,7 @@ from lapwing.kernels import math as exact
 from lapwing.kernels.codegen import map_tuple
 
 LARGEST = 0.9  # of the inductance at which speed and current oscillate
+RESOLVED = 0.1  # longest step times decay rate of a transient that a step resolves without error control
 NONE = -0.0  # [A] neutral element of addition, also for the sign of 0.0: the compiler removes it
 
 
@@ -57,3 +58,20 @@ def _with_inductance(arguments):
 def transient_currents(constants, memory, t, voltage):
     """Return the transient current [A] of each winding at a time [s]."""
     return by_axis(_without_inductance, _with_inductance, constants, (constants, memory, t, voltage))
+
+
+@always_inline
+def _never(_):
+    return False
+
+
+@always_inline
+def _fast(arguments):
+    constants, h = arguments
+    return constants[2] * h > RESOLVED
+
+
+@always_inline
+def decays_within(constants, h):
+    """Return True if transient currents decay so fast that a step of h [s] needs error control."""
+    return by_axis(_never, _fast, constants, (constants, h))

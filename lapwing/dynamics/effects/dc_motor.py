@@ -9,7 +9,12 @@ from lapwing.dynamics.effects._axes import by_axis
 from lapwing.dynamics.effects._external_motor import FULL_FRICTION, DcMotorInputs, ExternalDcMotor, idle_current
 from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.effects._hooks import discrete_update, motor, switches
-from lapwing.dynamics.effects._motor_winding import NONE, transient_currents, winding_constants
+from lapwing.dynamics.effects._motor_winding import (
+    NONE,
+    decays_within,
+    transient_currents,
+    winding_constants,
+)
 from lapwing.dynamics.vector import first, pair, second
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple, reduce_tuple
@@ -229,11 +234,12 @@ def _reaches(c, reached, both, transient):
 
 
 @switches(DcMotor)
-def reaches_limit(e, memory, s, voltage, h):
-    """Return True unless every current stays within its limits, or beyond one of them.
+def needs_error_control(e, memory, s, voltage, h):
+    """Return True unless every current stays within its limits, or beyond one of them, without a fast transient.
 
     At constant voltage V a current before limits, (V - K w) / R, changes with the speed only.
     """
     speed = s.motion.rotor_speed
     transients = transient_currents(e.winding, memory, s.t, voltage)
-    return reduce_tuple(_reaches, (e, s.layout, h), False, map_tuple(pair, 0.0, speed, voltage), transients)
+    fast = decays_within(e.winding, h)
+    return reduce_tuple(_reaches, (e, s.layout, h), fast, map_tuple(pair, 0.0, speed, voltage), transients)
