@@ -54,16 +54,17 @@ def detour(box: Any, position: Vec3, towards: Vec3, across: bool) -> float:
     x, y, c, s = position[0] - box[0], position[1] - box[1], box[2], box[3]
     place, other = c * x + s * y, c * y - s * x
     speed, aside = c * towards[0] + s * towards[1], c * towards[1] - s * towards[0]
-    half, wide = box[4], box[5]
+    low, high, first, last = box[4], box[5], -box[6], box[6]
     if across:
-        place, other, speed, aside, half, wide = other, place, aside, speed, wide, half
-    if place < 0.0:
-        place, speed = -place, -speed
-    distance = place - half
+        place, other, speed, aside = other, place, aside, speed
+        low, high, first, last = first, last, low, high
+    distance = place - high
+    if speed < 0.0:
+        distance, speed = low - place, -speed
     if distance <= 0.0 or speed <= 0.0:
         return 0.0
     way = distance / speed
-    if abs(other + way * aside) > wide or position[2] + way * towards[2] > box[6]:
+    if not first <= other + way * aside <= last or position[2] + way * towards[2] > box[7]:
         return 0.0
     return 2.0 * distance * speed
 

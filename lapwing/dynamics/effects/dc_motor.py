@@ -5,21 +5,24 @@ from typing import TYPE_CHECKING, Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
-from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._axes import by_axis
 from lapwing.dynamics.effects._external_motor import FULL_FRICTION, DcMotorInputs, ExternalDcMotor, idle_current
 from lapwing.dynamics.effects._from_scene import validate_table
 from lapwing.dynamics.effects._hooks import discrete_update, motor, switches
+from lapwing.dynamics.effects._motor_winding import (
+    NONE,
+    decays_within,
+    transient_currents,
+    winding_constants,
+)
 from lapwing.dynamics.vector import first, pair, second
 from lapwing.kernels import always_inline
-from lapwing.kernels import math as exact
 from lapwing.kernels.codegen import map_tuple, reduce_tuple
 
 if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
 KIND = "motor model"
-LARGEST = 0.9  # of the inductance at which speed and current oscillate
 
 
 class Settings(NamedTuple):
@@ -62,7 +65,7 @@ class DcMotor(NamedTuple):
         resistance = engine.resistance + engine.esc_resistance
         winding = ()
         if settings.inductance:
-            winding = _winding_constants(
+            winding = winding_constants(
                 settings.inductance, resistance, engine.rotor_constant, engine.belt_efficiency, inertia
             )
         return cls(
@@ -87,21 +90,6 @@ class DcMotor(NamedTuple):
         """Return the motors with named inputs."""
         unknown = (math.nan,) * self.rotors
         return ExternalDcMotor(self, DcMotorInputs(unknown, unknown, unknown))
-
-
-def _winding_constants(
-    inductance: float, resistance: float, constant: float, efficiency: float, inertia: float
-) -> tuple:
-    """Return (lag, effective inverse inertia, rate) from the roots of the linear motor (theory.md, eq. (2.76))."""
-    electrical = inductance / resistance
-    mechanical = inertia * resistance / (efficiency * constant * constant)
-    if 4.0 * electrical >= LARGEST * mechanical:
-        most = 0.25 * LARGEST * mechanical * resistance
-        raise ConfigError("inductance", f"got {inductance:g} H", f"at most {most:.2g} H for this motor")
-    root = math.sqrt(1.0 - 4.0 * electrical / mechanical)
-    slow, fast = 2.0 / (mechanical * (1.0 + root)), (1.0 + root) / (2.0 * electrical)  # [1/s]
-    lag = constant * inductance / (resistance * (resistance - inductance * slow))
-    return lag, 1.0 / (inertia - efficiency * constant * lag), fast
 
 
 @always_inline
@@ -137,69 +125,61 @@ def _power(e, speed, free, current, voltage):
 
 
 @always_inline
-def _rotor_response(e, speed, torque, free, voltage):
-    """Return (acceleration [rad/s^2], current [A], power [W]) of a rotor at a current before limits."""
-    current = _limit_current(e, speed, free)
-    acceleration = _acceleration(e, e.inverse_inertia, speed, current, torque)
-    return acceleration, current, _power(e, speed, free, current, voltage)
+def _no_lag(_):
+    return NONE
+
+
+@always_inline
+def _lag(arguments):
+    e, speed, torque, current = arguments
+    lag, inverse_inertia, _ = e.winding
+    return lag * _acceleration(e, inverse_inertia, speed, current, torque)
+
+
+@always_inline
+def _lag_current(e, speed, torque, current):
+    """Return the current [A] by which a winding lags behind its motor's acceleration."""
+    return by_axis(_no_lag, _lag, e.winding, (e, speed, torque, current))
 
 
 @always_inline
 def _steady_current(e, speed, torque, voltage):
     """Return the current [A] before limits once the transient of the winding is over."""
     free = _free(e, speed, voltage)
-    lag, inverse_inertia, _ = e.winding
-    return free + lag * _acceleration(e, inverse_inertia, speed, free, torque)
+    return free + _lag_current(e, speed, torque, free)
 
 
 @always_inline
-def _without_lag(c, both, voltage):
+def _rotor_response(e, both, more):
+    """Return (acceleration [rad/s^2], current [A], power [W]) of a rotor."""
     speed, torque = both
-    return _rotor_response(c[0], speed, torque, _free(c[0], speed, voltage), voltage)
+    voltage, transient = more
+    free = _steady_current(e, speed, torque, voltage) + transient
+    current = _limit_current(e, speed, free)
+    acceleration = _acceleration(e, e.inverse_inertia, speed, current, torque)
+    return acceleration, current, _power(e, speed, free, current, voltage)
 
 
 @always_inline
-def _with_lag(c, both, more):
-    e, decay = c
-    speed, torque = both
-    voltage, (transient, _) = more
-    return _rotor_response(e, speed, torque, _steady_current(e, speed, torque, voltage) + decay * transient, voltage)
-
-
-@always_inline
-def _all_without_lag(arguments):
-    e, _, __, both, voltage = arguments
-    return map_tuple(_without_lag, (e, 0.0), both, voltage)
-
-
-@always_inline
-def _all_with_lag(arguments):
-    e, memory, t, both, voltage = arguments
-    decay = exact.exp(-e.winding[2] * (t - memory[0]))
-    return map_tuple(_with_lag, (e, decay), both, map_tuple(pair, 0.0, voltage, memory[1]))
-
-
-@always_inline
-def _transient_after_step(c, both, more):
+def _transient_after_step(e, both, more):
     """Return (transient [A], voltage [V]) of a rotor after a step of the voltage."""
-    e, decay = c
     speed, torque = both
-    voltage, (transient, before) = more
-    current = _limit_current(e, speed, _steady_current(e, speed, torque, before) + decay * transient)
+    voltage, (transient, (_, before)) = more
+    current = _limit_current(e, speed, _steady_current(e, speed, torque, before) + transient)
     return current - _steady_current(e, speed, torque, voltage), voltage
 
 
 @always_inline
-def _update_without_lag(arguments):
+def _update_without_lag(_):
     return ()
 
 
 @always_inline
 def _update_with_lag(arguments):
     e, memory, s, rotors = arguments
-    decay = exact.exp(-e.winding[2] * (s.t - memory[0]))
     both = map_tuple(pair, 0.0, s.motion.rotor_speed, rotors.torque)
-    return s.t, map_tuple(_transient_after_step, (e, decay), both, map_tuple(pair, 0.0, rotors.voltage, memory[1]))
+    windings = map_tuple(pair, 0.0, transient_currents(e.winding, memory, s.t, rotors.voltage), memory[1])
+    return s.t, map_tuple(_transient_after_step, e, both, map_tuple(pair, 0.0, rotors.voltage, windings))
 
 
 @discrete_update(DcMotor)
@@ -217,7 +197,9 @@ def _third(_, driven, __):
 def dc_motor(e, memory, s, loads, voltage):
     """Return (acceleration [rad/s^2], current [A], power [W]) of each rotor."""
     both = map_tuple(pair, 0.0, s.motion.rotor_speed, loads.torque)
-    driven = by_axis(_all_without_lag, _all_with_lag, e.winding, (e, memory, s.t, both, voltage))
+    driven = map_tuple(
+        _rotor_response, e, both, map_tuple(pair, 0.0, voltage, transient_currents(e.winding, memory, s.t, voltage))
+    )
     return (
         map_tuple(first, 0.0, driven, driven),
         map_tuple(second, 0.0, driven, driven),
@@ -243,43 +225,21 @@ def _near_limit(e, most, h, speed, free, slack):
 
 
 @always_inline
-def _most_current(e, layout):
-    return min(e.current_limit, layout.max_voltage * e.inverse_resistance)
-
-
-@always_inline
-def _reaches_without_lag(c, reached, speed, voltage):
-    e, layout, h = c
-    return reached or _near_limit(e, _most_current(e, layout), h, speed, _free(e, speed, voltage), 0.0)
-
-
-@always_inline
-def _reaches_with_lag(c, reached, both, winding):
+def _reaches(c, reached, both, transient):
     e, layout, h = c
     speed, voltage = both
-    lag, inverse_inertia, _ = e.winding
-    most, free = _most_current(e, layout), _free(e, speed, voltage)
-    change = lag * e.efficiency * e.motor_constant * inverse_inertia * (abs(free) + most)  # by the acceleration
-    return reached or _near_limit(e, most, h, speed, free, change + abs(winding[0]))
-
-
-@always_inline
-def _any_without_lag(arguments):
-    c, _, speed, voltage = arguments
-    return reduce_tuple(_reaches_without_lag, c, False, speed, voltage)
-
-
-@always_inline
-def _any_with_lag(arguments):
-    c, memory, speed, voltage = arguments
-    return reduce_tuple(_reaches_with_lag, c, False, map_tuple(pair, 0.0, speed, voltage), memory[1])
+    most, free = min(e.current_limit, layout.max_voltage * e.inverse_resistance), _free(e, speed, voltage)
+    slack = _lag_current(e, 0.0, 0.0, abs(free) + most) + abs(transient)
+    return reached or _near_limit(e, most, h, speed, free, slack)
 
 
 @switches(DcMotor)
-def reaches_limit(e, memory, s, voltage, h):
-    """Return True unless every current stays within its limits, or beyond one of them.
+def needs_error_control(e, memory, s, voltage, h):
+    """Return True unless every current stays within its limits, or beyond one of them, without a fast transient.
 
     At constant voltage V a current before limits, (V - K w) / R, changes with the speed only.
     """
-    arguments = (e, s.layout, h), memory, s.motion.rotor_speed, voltage
-    return by_axis(_any_without_lag, _any_with_lag, e.winding, arguments)
+    speed = s.motion.rotor_speed
+    transients = transient_currents(e.winding, memory, s.t, voltage)
+    fast = decays_within(e.winding, h)
+    return reduce_tuple(_reaches, (e, s.layout, h), fast, map_tuple(pair, 0.0, speed, voltage), transients)

@@ -19,7 +19,7 @@ class Relief(NamedTuple):
     grid: np.ndarray  # (rows along y, columns along x) heights [m]; (0, 0): none
     corner: tuple[float, float]  # [m] world x and y of grid[0, 0]
     spacing: float  # [m] spacing of the grid
-    boxes: np.ndarray  # (n, 7) x, y of the centre, cosine and sine of the heading, half length and width, z of the top
+    boxes: np.ndarray  # (n, 8) x, y of a point, cosine, sine of the heading, ends along it, half width, z of the top
     cylinders: np.ndarray  # (n, 4) x, y of the axis, radius, z of the top
     summit: float  # [m] largest height of the terrain above the plane through the origin with that slope
 
@@ -67,9 +67,10 @@ def _in_box(box, x, y):
     """Return (distance [m] to the nearest side, negative outside; x and y of that side's normal)."""
     dx, dy, c, s = x - box[0], y - box[1], box[2], box[3]
     u, v = c * dx + s * dy, c * dy - s * dx
-    along, across = box[4] - abs(u), box[5] - abs(v)
+    behind, ahead, across = u - box[4], box[5] - u, box[6] - abs(v)
+    along = min(behind, ahead)
     if along < across:
-        sign = math.copysign(1.0, u)
+        sign = 1.0 if ahead <= behind else -1.0
         return along, sign * c, sign * s
     sign = math.copysign(1.0, v)
     return across, -sign * s, sign * c
@@ -91,8 +92,8 @@ def top(t, x, y):
     height, a, b = field(t, x, y)
     normal = _normal(a, b)
     for i in range(t.boxes.shape[0]):
-        if t.boxes[i, 6] > height and _in_box(t.boxes[i], x, y)[0] >= 0.0:
-            height, normal = t.boxes[i, 6], UP
+        if t.boxes[i, 7] > height and _in_box(t.boxes[i], x, y)[0] >= 0.0:
+            height, normal = t.boxes[i, 7], UP
     for i in range(t.cylinders.shape[0]):
         if t.cylinders[i, 3] > height and _in_cylinder(t.cylinders[i], x, y)[0] >= 0.0:
             height, normal = t.cylinders[i, 3], UP
@@ -119,7 +120,7 @@ def depth(t, place):
     normal = _normal(a, b)
     result = ((height - place[2]) * normal[2], normal)
     for i in range(t.boxes.shape[0]):
-        result = _deeper(result, place, t.boxes[i, 6], _in_box(t.boxes[i], place[0], place[1]))
+        result = _deeper(result, place, t.boxes[i, 7], _in_box(t.boxes[i], place[0], place[1]))
     for i in range(t.cylinders.shape[0]):
         result = _deeper(result, place, t.cylinders[i, 3], _in_cylinder(t.cylinders[i], place[0], place[1]))
     return result

@@ -59,11 +59,11 @@ def _to_field(t, o, d, steep, longest):
 
 
 @kernel
-def _between(position, direction, half, first, last):
-    """Return the part of [first, last] in which a coordinate is within +-half."""
+def _between(position, direction, low, high, first, last):
+    """Return the part of [first, last] in which a coordinate is between `low` and `high`."""
     if direction == 0.0:
-        return (first, last) if abs(position) <= half else (math.inf, -math.inf)
-    one, two = (-half - position) / direction, (half - position) / direction
+        return (first, last) if low <= position <= high else (math.inf, -math.inf)
+    one, two = (low - position) / direction, (high - position) / direction
     return max(first, min(one, two)), min(last, max(one, two))
 
 
@@ -79,9 +79,9 @@ def _below(height, o, d, first, last):
 @kernel
 def _to_box(box, o, d):
     x, y, c, s = o[0] - box[0], o[1] - box[1], box[2], box[3]
-    first, last = _below(box[6], o, d, 0.0, math.inf)
-    first, last = _between(c * x + s * y, c * d[0] + s * d[1], box[4], first, last)
-    first, last = _between(c * y - s * x, c * d[1] - s * d[0], box[5], first, last)
+    first, last = _below(box[7], o, d, 0.0, math.inf)
+    first, last = _between(c * x + s * y, c * d[0] + s * d[1], box[4], box[5], first, last)
+    first, last = _between(c * y - s * x, c * d[1] - s * d[0], -box[6], box[6], first, last)
     return first if first <= last else math.inf
 
 

@@ -53,13 +53,13 @@ def relief(
     base, treads = _treads(steps, step_heading)
     rows = [_row(box) for box in boxes] + treads
     plane = [[u * slope[0] + v * slope[1] for u, v in _corners(row)] for row in rows]
-    over = [row[6] - min(z) for row, z in zip(rows, plane, strict=True)]
+    over = [row[7] - min(z) for row, z in zip(rows, plane, strict=True)]
     over += [z - slope[0] * x - slope[1] * y + radius * math.hypot(*slope) for x, y, radius, z in cylinders]
     summit = max([base + bump_height + (float(heights.max()) if heights.size else 0.0), *over])
     result = Relief(
         (float(slope[0]), float(slope[1])), float(bump_height), 2.0 * math.pi / bump_length, base, heights,
         (float(corner[0]), float(corner[1])), float(spacing),
-        np.array(rows, dtype=float).reshape(-1, 7), np.array(cylinders, dtype=float).reshape(-1, 4), float(summit),
+        np.array(rows, dtype=float).reshape(-1, 8), np.array(cylinders, dtype=float).reshape(-1, 4), float(summit),
     )  # fmt: skip
     if tuple(slope) == (0.0, 0.0) and bump_height == 0.0 and not (heights.size or rows or len(cylinders)):
         return LEVEL
@@ -89,12 +89,12 @@ def _validate_grid(grid: np.ndarray, corner: tuple[float, float], spacing: float
 
 def _row(box: Box) -> list[float]:
     x, y, length, width, heading, z = box
-    return [x, y, math.cos(heading), math.sin(heading), 0.5 * length, 0.5 * width, z]
+    return [x, y, math.cos(heading), math.sin(heading), -0.5 * length, 0.5 * length, 0.5 * width, z]
 
 
 def _corners(row: Sequence[float]) -> list[np.ndarray]:
-    x, y, c, s, half_length, half_width, _ = row
-    ends = [(u, v) for u in (-half_length, half_length) for v in (-half_width, half_width)]
+    x, y, c, s, first, last, half_width, _ = row
+    ends = [(u, v) for u in (first, last) for v in (-half_width, half_width)]
     return [np.array((x + c * u - s * v, y + s * u + c * v)) for u, v in ends]
 
 
@@ -112,6 +112,7 @@ def _treads(steps: Sequence[tuple[float, float]], heading: float) -> tuple[float
         first = next((j + 1 for j in range(i - 1, -1, -1) if level[j] < height), 0)
         last = next((j for j in range(i + 1, len(level)) if level[j] < height), len(level))
         start, stop = edge[first], edge[last]
-        c, s, middle = math.cos(heading), math.sin(heading), 0.5 * (start + stop)
-        rows.append([c * middle, s * middle, c, s, 0.5 * (stop - start), FAR, height])
+        c, s = math.cos(heading), math.sin(heading)
+        wall = stop if start == -FAR else start  # distances from a point far away would round off
+        rows.append([c * wall, s * wall, c, s, start - wall, stop - wall, FAR, height])
     return base, rows

@@ -13,7 +13,12 @@ from lapwing.dynamics.noise import Key, stream_key
 from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles import multirotor, multirotor_slung
 from lapwing.dynamics.vehicles.multirotor import advance, observe
-from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState, motion_of
+from lapwing.dynamics.vehicles.multirotor_equations import (
+    MultirotorParameters,
+    MultirotorState,
+    motion_of,
+    with_tolerance,
+)
 from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.codegen import map_index
 from lapwing.kernels.state_tree import flatten
@@ -33,6 +38,7 @@ FINEST = 64  # steps of the reference per communication step; other runs have at
 EXTENDED = (multirotor, multirotor_slung)  # forms with steps in extended precision
 JUMP, JUMP_INTERVAL = 0.02, 0.4  # [s] duration at a motor's limit; interval of the manoeuvres
 TICK = 1000  # first tick, after the start of random effects
+TOLERANCE = 1e-12  # of substeps at the limits of motors and flow, so that the errors of the steps remain
 
 
 Voltages = Callable[[MultirotorParameters, float], tuple[float, ...]]  # [V] of each motor at a time [s]
@@ -99,6 +105,7 @@ def physics(scene: Scene, level: bool = False) -> tuple[MultirotorParameters, Mu
         level: start level without rotation; otherwise tilted and rotating.
     """
     form, p = model(scene).describe(scene)
+    p = with_tolerance(p, TOLERANCE)
     attitude, omega_body = (NO_ROTATION, ZERO) if level else (exp((0.1, -0.15, 0.3)), (0.4, -0.6, 0.3))
     state = form.initial_state(p, (0.0, 0.0, HEIGHT), attitude, hover_speed(p), (3.0, 1.0, -0.5), omega_body)
     if form is multirotor_slung:  # stretched by the load, so the cable stays taut and no step is split

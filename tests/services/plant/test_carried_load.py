@@ -8,6 +8,7 @@ import pytest
 from lapwing.cosim.config.serialise import first_difference, from_json, to_json
 from lapwing.cosim.scene import SceneError
 from lapwing.dynamics.lie.quaternion import rotate
+from lapwing.services.plant.schema import LEAST_PART_TOLERANCE
 from lapwing.services.scene_resolver import from_resolved, load, parse, resolve
 from tests.cosim.memory_log import fly
 from tests.cosim.test_agreement import fly_apart
@@ -100,6 +101,14 @@ def test_static_cables_carry_weight(recorded_flight):
     # mirrored about the plane between the two
     assert left.position[-1] * (1, -1, 1) == pytest.approx(right.position[-1], abs=1e-6)
     assert left.position[-1, 1] < 0.999  # pulled inwards
+
+
+def test_strictest_accuracy_keeps_load_substeps_above_round_off(tmp_path):
+    """With the tolerance of the vehicles round-off rejects every substep, and a communication step never ends."""
+    setup = resolve(two(tmp_path, "solver.accuracy=1e-12", "solver.step=0.001"))
+    plants = [config.parameters for config in setup.services["plant"].parameters.given]
+    assert [plant.core.vehicle.tolerance for plant in plants] == [1e-15, 1e-15]
+    assert [plant.others.load.tolerance for plant in plants if plant.others.load] == [LEAST_PART_TOLERANCE]
 
 
 def test_first_carrier_publishes_load(recorded_flight):

@@ -11,6 +11,7 @@ from lapwing.dynamics.vehicles.multirotor_slung import GROUND_DAMPING, GROUND_FR
 from lapwing.kernels import kernel
 from lapwing.services.plant.blocks import carried_load
 from lapwing.services.plant.blocks.carried_load import LoadMotion, LoadPlant
+from lapwing.services.plant.schema import LEAST_PART_TOLERANCE
 from tests.dynamics.vehicles.rebound import rebound
 
 RK4 = get("rk4_renormalised").Method()
@@ -29,7 +30,7 @@ def move_load_for(p, x, carrier, ticks):
 
 def closed_form(hook, start, velocity, steps):
     """Return height and vertical speed of a weightless load under a fixed hook."""
-    p = LoadPlant((SLING,), ZERO, RK4, INTERVAL / steps, steps, INTERVAL, 1e-10)
+    p = LoadPlant((SLING,), ZERO, RK4, INTERVAL / steps, steps, INTERVAL, LEAST_PART_TOLERANCE)
     carrier = NeighbourState(hook_world=(0.0, 0.0, hook))
     x = move_load_for(p, LoadMotion((0.0, 0.0, start), (0.0, 0.0, velocity)), carrier, round(SECONDS / INTERVAL))
     return x.load_position[2], x.load_velocity[2]

@@ -157,16 +157,16 @@ def test_building_hides_satellites_behind_it():
 
 def test_detour_is_path_of_image_antenna():
     """Box wall at x = 10: the antenna's image is at x = 20 - x; the path is longer by (image - antenna) . u."""
-    wall = np.array([15.0, 0.0, 1.0, 0.0, 5.0, 30.0, 40.0])
+    wall = np.array([15.0, 0.0, 1.0, 0.0, -5.0, 5.0, 30.0, 40.0])
     antenna, towards = np.array([4.0, 3.0, 1.5]), np.array([-0.6, 0.2, math.sqrt(1 - 0.4)])
     image = antenna * [-1, 1, 1] + [20.0, 0.0, 0.0]
     expected = (antenna - image) @ towards
     assert multipath.detour(wall, tuple(antenna), tuple(towards), False) == pytest.approx(expected)
     assert multipath.detour(wall, tuple(antenna), (0.6, 0.2, towards[2]), False) == 0.0  # from behind the wall
-    rotated_box = np.array([0.0, 15.0, 0.0, 1.0, 5.0, 30.0, 40.0])  # the same wall across y
+    rotated_box = np.array([0.0, 15.0, 0.0, 1.0, -5.0, 5.0, 30.0, 40.0])  # the same wall across y
     a, u = (-3.0, 4.0, 1.5), (-0.2, -0.6, towards[2])
     assert multipath.detour(rotated_box, a, u, False) == pytest.approx(expected)
-    low = np.array([*wall[:6], 8.0])  # above its top
+    low = np.array([*wall[:7], 8.0])  # above its top
     assert multipath.detour(low, tuple(antenna), tuple(towards), False) == 0.0
 
 

@@ -1,4 +1,4 @@
-"""Scenes with a multirotor of five bodies as problems: accepted steps, and order of the method."""
+"""Scenes with a multirotor as problems: accepted steps of five bodies, and order of the method."""
 
 from pathlib import Path
 
@@ -27,3 +27,13 @@ def test_five_bodies_use_steps_accepted_by_scene(monkeypatch):
     assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 3.7), errors
     for h in method.settings:
         load(HOVER, ["vehicle.model=multibody", f"solver.step={h!r}"])
+
+
+def test_limits_of_motors_leave_order_of_method(monkeypatch):
+    """Substeps at a limit are so fine that the measured error is that of the step."""
+    monkeypatch.setattr(plant.integrators, "compatible_methods", lambda p, x: ["rk4_renormalised"])
+    problem = plant.problem(load("os4_hover", ["solver.accuracy=1e-4"]), plant.jumping_voltages)
+    (method,) = problem.methods
+    exact = problem.reference()
+    errors = [error(method.read(h, method.prepare(h)()).samples[-1], exact) for h in (4e-3, 2e-3, 1e-3)]
+    assert np.all(np.log2(np.array(errors[:-1]) / errors[1:]) > 3.7), errors

@@ -27,7 +27,8 @@ from lapwing.dynamics.vehicles.multirotor_equations import (
 from lapwing.kernels.state_tree import flatten
 from lapwing.services.plant.schema import contact_tolerance
 from lapwing.studies.accuracy.coordinates import coordinates, of_state
-from lapwing.studies.accuracy.landings.reference import LandingBody, LandingGround, landing
+from lapwing.studies.accuracy.landings.reference import landing
+from lapwing.studies.accuracy.landings.reference_equations import LandingBody, LandingGround
 from lapwing.studies.accuracy.solver_selection import IMPACT_SHARE
 
 AIRFRAME = Path(lapwing.scenes.__file__).parent / "vehicles/delivery_drone.toml"
@@ -162,7 +163,7 @@ def contact_of(p: MultirotorParameters) -> GroundContact:
     return next(e for e in p.effects if isinstance(e, GroundContact))
 
 
-def exact(case: Landing, tolerance: float = 3e-14) -> tuple[np.ndarray, int]:
+def exact(case: Landing, tolerance: float = 3e-15) -> tuple[np.ndarray, int]:
     """Return (states of the reference at `times`, shape (k, 22); number of its events)."""
     p, state = plant(case)
     e, layout = contact_of(p), p.layout

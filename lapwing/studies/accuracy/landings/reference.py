@@ -1,178 +1,113 @@
 """Event-located reference of a landing: smooth pieces by SciPy's DOP853, transitions of each foot by root finding.
 
-Independent of `lapwing.dynamics`: attitudes are matrices, and the law of a foot is written by cases, which change only
-at located events: touchdown and lift-off, full onset of the normal force, change of its sign, sticking and sliding, the
-slip at which the dynamic coefficient is reached (theory.md, section 2.8), and on ground with a step the nearest face:
-its top, its wall, or the ground before it (section 2.9).
+The cases of `reference_equations` change only at events. Steps integrate the change from an origin, which is a sum of
+two doubles, so that the sums of thousands of steps do not round off.
 """
 
-import math
-from typing import Any, NamedTuple
+from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 from scipy.integrate import DOP853
 from scipy.optimize import brentq
 
-from lapwing.kernels import kernel
+from lapwing.studies.accuracy.landings.reference_equations import (
+    BEYOND,
+    LandingBody,
+    LandingGround,
+    cases_at,
+    margins,
+    rate,
+)
 
 TOLERANCE = 1e-12  # of a step, relative to 1 + size
+LEAST_RELATIVE = 2.3e-14  # relative tolerance of a change, which is small; DOP853 accepts no smaller one
 LONGEST = 1e-3  # [s] limit of a step, so that no foot touches and leaves within one
 GRAZING = 2e-3  # [m] from the ground or a wall, within which a step is searched for contacts
-FULL, SLOW = 1, 4  # other rows of the cases: 0 in the ground, 2 pressing, 3 sliding
-BEYOND, TOP, FLOOR = 5, 6, 7  # of a step: behind its wall, nearer to its top than to its wall, nearest to the ground
 
 
-class LandingBody(NamedTuple):
-    """Rigid body with contact points, and rotors with decaying speeds."""
+class _Origin(NamedTuple):
+    """State from which a step starts, as the sum of two doubles."""
 
-    mass: float  # [kg]
-    inertia: np.ndarray  # [kg m^2] principal, shape (3,)
-    points: np.ndarray  # [m] in the body, shape (n, 3)
-    rotors: np.ndarray  # [m] in the body, shape (m, 3)
-    signs: np.ndarray  # of the torque on the body, shape (m,)
-    thrust: float  # [N s^2] over the squared rotor speed
-    torque: float  # [N m s^2] over the squared rotor speed
-    lag: float  # [1/s] decay rate of the rotors
-    gravity: float  # [m/s^2]
+    value: np.ndarray
+    rest: np.ndarray
 
+    def plus(self, change: np.ndarray) -> np.ndarray:
+        """Return the rounded state after a change."""
+        return self.value + (self.rest + change)
 
-class LandingGround(NamedTuple):
-    """Ground z = a x + b y + A sin k x sin k y, on it a step up along x, and the law of contact."""
-
-    slope: tuple[float, float]
-    bump: float  # [m] A
-    wave: float  # [1/m] k
-    stiffness: float  # [N/m]
-    damping: float  # [N s/m]
-    width: float  # [m]
-    static: float
-    dynamic: float
-    shear_stiffness: float  # [N/m]
-    shear_damping: float  # [N s/m]
-    slow: float  # [m/s] slip of the dynamic coefficient
-    edge: float = math.inf  # [m] x of the step's wall
-    rise: float = 0.0  # [m] z of its level top
+    def moved(self, change: np.ndarray) -> "_Origin":
+        """Return the origin after a change."""
+        value, rest = _exact_sum(self.value, change)
+        return _Origin(*_exact_sum(value, rest + self.rest))
 
 
-@kernel
-def _foot(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray, i: int) -> Any:
-    """Return (arm, normal, slip, depth [m], approach [m/s], slip [m/s], shear, shear [N]) of a point, world."""
-    arm, rotation_velocity = np.zeros(3), np.zeros(3)
-    b = body.points[i]
-    o = y[15:18]
-    rotation = (o[1] * b[2] - o[2] * b[1], o[2] * b[0] - o[0] * b[2], o[0] * b[1] - o[1] * b[0])
-    for row in range(3):
-        for k in range(3):
-            arm[row] += y[3 + 3 * row + k] * b[k]
-            rotation_velocity[row] += y[3 + 3 * row + k] * rotation[k]
-    u, v = ground.wave * (y[0] + arm[0]), ground.wave * (y[1] + arm[1])
-    height = ground.slope[0] * (y[0] + arm[0]) + ground.slope[1] * (y[1] + arm[1])
-    height += ground.bump * math.sin(u) * math.sin(v)
-    gradient = ground.bump * ground.wave
-    normal = np.array(
-        [
-            -ground.slope[0] - gradient * math.cos(u) * math.sin(v),
-            -ground.slope[1] - gradient * math.sin(u) * math.cos(v),
-            1.0,
-        ]
-    )
-    normal /= math.sqrt((normal * normal).sum())
-    depth = (height - y[2] - arm[2]) * normal[2]
-    if cases[BEYOND, i] and cases[TOP, i]:
-        normal, depth = np.array([0.0, 0.0, 1.0]), ground.rise - y[2] - arm[2]
-    elif cases[BEYOND, i] and not cases[FLOOR, i]:
-        normal, depth = np.array([-1.0, 0.0, 0.0]), y[0] + arm[0] - ground.edge
-    velocity = y[12:15] + rotation_velocity
-    rising = (velocity * normal).sum()
-    slip = velocity - rising * normal
-    deflection = y[len(y) - 3 * (len(body.points) - i) :][:3]
-    along = (deflection * normal).sum()
-    shear = ground.shear_stiffness * (deflection - along * normal) + ground.shear_damping * slip
-    size, speed = math.sqrt((shear * shear).sum()), math.sqrt((slip * slip).sum())
-    return arm, normal, depth, -rising, speed, shear, size
+def _exact_sum(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return (rounded sum, its rounding error)."""
+    total = a + b
+    part = total - a
+    return total, (a - (total - part)) + (b - part)
 
 
-@kernel
-def _limit(ground: Any, cases: np.ndarray, i: int, depth: float, approach: float, speed: float) -> Any:
-    """Return (normal force, friction at which the point slides) [N] under given cases."""
-    if not (cases[0, i] and cases[2, i]):
-        return 0.0, 0.0
-    xi, slow = depth / ground.width, speed / ground.slow
-    onset = 1.0 if cases[FULL, i] else xi * xi * (3.0 - 2.0 * xi)
-    normal_force = onset * (ground.stiffness * depth + ground.damping * approach)
-    decay = slow * slow * (3.0 - 2.0 * slow) if cases[SLOW, i] else 1.0
-    return normal_force, (ground.static + (ground.dynamic - ground.static) * decay) * normal_force
+class _Piece:
+    """Smooth piece between two events: steps of the change from an origin that moves along."""
 
+    def __init__(
+        self, body: LandingBody, ground: LandingGround, cases: np.ndarray, origin: _Origin, tolerance: float
+    ) -> None:
+        self.body, self.ground, self.cases, self.origin = body, ground, cases, origin
+        self.tolerance = tolerance
 
-@kernel
-def rate(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the derivative of (position, R_world_body, velocity, omega_body, rotor speeds, deflections)."""
-    n, m = len(body.points), len(body.rotors)
-    result = np.zeros_like(y)
-    R, o = y[3:12].copy().reshape(3, 3), y[15:18]
-    force, torque_world = np.array([0.0, 0.0, -body.mass * body.gravity]), np.zeros(3)
-    torque = np.zeros(3)
-    for k in range(m):
-        square = y[18 + k] * y[18 + k]
-        force += body.thrust * square * R[:, 2]
-        torque[0] += body.rotors[k, 1] * body.thrust * square
-        torque[1] -= body.rotors[k, 0] * body.thrust * square
-        torque[2] += body.signs[k] * body.torque * square
-        result[18 + k] = -body.lag * y[18 + k]
-    for i in range(n):
-        at = 18 + m + 3 * i
-        stretch = -ground.shear_stiffness / ground.shear_damping * y[at : at + 3]
-        if cases[0, i] and cases[2, i]:
-            arm, normal, depth, approach, speed, shear, size = _foot(body, ground, cases, y, i)
-            normal_force, limit = _limit(ground, cases, i, depth, approach, speed)
-            current = shear * (limit / max(size, 1e-300)) if cases[3, i] else shear
-            stretch = stretch + current / ground.shear_damping
-            push = normal_force * normal - current
-            force += push
-            torque_world += np.array(
-                [
-                    arm[1] * push[2] - arm[2] * push[1],
-                    arm[2] * push[0] - arm[0] * push[2],
-                    arm[0] * push[1] - arm[1] * push[0],
+    def solver(self, t: float, end: float, first_step: float | None) -> DOP853:
+        """Return the solver of changes from the origin at time t [s]."""
+        return DOP853(
+            lambda _, change: rate(self.body, self.ground, self.cases, self.origin.plus(change)),
+            t, np.zeros_like(self.origin.value), end, rtol=LEAST_RELATIVE,
+            atol=self.tolerance * (1.0 + np.abs(self.origin.value)), max_step=LONGEST, first_step=first_step,
+        )  # fmt: skip
+
+    def change_until(self, solver: DOP853, t: float) -> np.ndarray:
+        """Return the change until a time within the last step, integrated again: more exact than its interpolation."""
+        if t <= solver.t_old:
+            return np.zeros_like(self.origin.value)
+        again = self.solver(solver.t_old, t, t - solver.t_old)
+        while again.status == "running":
+            again.step()
+        return again.y
+
+    def first_crossing(self, solver: DOP853) -> tuple[float, np.ndarray] | None:
+        """Return (time, cases that change) of the first event within the last step; None if there is none."""
+
+        def wrong(change: np.ndarray) -> np.ndarray:
+            """Positive where a case does not hold any more; the friction of points that do not press has none."""
+            values = margins(self.body, self.ground, self.cases, self.origin.plus(change))
+            result = np.where(self.cases, -1.0, 1.0) * values
+            result[1:BEYOND, ~self.cases[0]] = -1.0  # in the air only the touch and the faces count
+            result[3, ~self.cases[2]] = -1.0
+            return result
+
+        at_end = wrong(solver.y)
+        points = [solver.t]
+        end_margins = margins(self.body, self.ground, self.cases, self.origin.plus(solver.y))
+        dense = None
+        if np.abs(end_margins[[0, BEYOND]]).min() < GRAZING:
+            dense = solver.dense_output()
+            points = list(np.linspace(solver.t_old, solver.t, 9)[1:])
+        before = solver.t_old
+        for point in points:
+            values = at_end if point == solver.t else wrong(dense(point))  # type: ignore[misc]
+            if (values > 0.0).any():
+                dense = dense or solver.dense_output()
+                roots = [
+                    (_root(wrong, dense, before, point, k), k) for k in zip(*np.nonzero(values > 0.0), strict=True)
                 ]
-            )
-        result[at : at + 3] = stretch
-    for k in range(3):
-        torque[k] += (R[:, k] * torque_world).sum()
-    h = body.inertia * o
-    result[:3] = y[12:15]
-    for row in range(3):
-        result[3 + 3 * row] = R[row, 1] * o[2] - R[row, 2] * o[1]
-        result[4 + 3 * row] = R[row, 2] * o[0] - R[row, 0] * o[2]
-        result[5 + 3 * row] = R[row, 0] * o[1] - R[row, 1] * o[0]
-    result[12:15] = force / body.mass
-    result[15] = (torque[0] - o[1] * h[2] + o[2] * h[1]) / body.inertia[0]
-    result[16] = (torque[1] - o[2] * h[0] + o[0] * h[2]) / body.inertia[1]
-    result[17] = (torque[2] - o[0] * h[1] + o[1] * h[0]) / body.inertia[2]
-    return result
-
-
-@kernel
-def margins(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return functions that are positive if a case holds, shape (8, n); their signs change at events."""
-    result = np.empty((8, len(body.points)))
-    for i in range(len(body.points)):
-        arm, _, depth, approach, speed, _, size = _foot(body, ground, cases, y, i)
-        result[0, i], result[1, i] = depth, depth - ground.width
-        result[2, i] = ground.stiffness * depth + ground.damping * approach
-        result[3, i] = size - _limit(ground, cases, i, depth, approach, speed)[1]
-        result[4, i] = ground.slow - speed
-        behind, above = y[0] + arm[0] - ground.edge, y[2] + arm[2]
-        result[BEYOND, i], result[TOP, i], result[FLOOR, i] = behind, behind + above - ground.rise, -above - behind
-    return result
-
-
-def cases_at(body: LandingBody, ground: LandingGround, y: np.ndarray) -> np.ndarray:
-    """Return the cases of a state."""
-    cases = np.zeros((8, len(body.points)), dtype=bool)
-    for _ in range(3):  # the depth depends on the face, the friction limit on other cases
-        cases = margins(body, ground, cases, y) > 0.0
-    return cases
+                t = min(roots)[0]
+                changed = np.zeros_like(self.cases)
+                for root, k in roots:
+                    changed[k] = root == t
+                return t, changed
+            before = point
+        return None
 
 
 def landing(
@@ -185,92 +120,53 @@ def landing(
     """
     out = np.empty((len(times), len(start)))
     out[0] = start
-    t, y, row, events = float(times[0]), start, 1, 0
-    cases = cases_at(body, ground, y)
-    step = None
+    t, origin, row, events = float(times[0]), _Origin(start, np.zeros_like(start)), 1, 0
+    cases, step = cases_at(body, ground, start), None
     while row < len(times):
-        current = cases
-        solver = DOP853(
-            lambda _, x, current=current: rate(body, ground, current, x), t, y, float(times[-1]),
-            rtol=tolerance, atol=tolerance, max_step=LONGEST, first_step=step and min(step, float(times[-1]) - t),
-        )  # fmt: skip
+        piece = _Piece(body, ground, cases, origin, tolerance)
+        solver = piece.solver(t, float(times[-1]), step and min(step, float(times[-1]) - t))
         crossed = None
         while crossed is None and row < len(times):
             if message := solver.step():
                 raise ValueError(f"reference: {message}")
-            crossed = _first_crossing(body, ground, current, solver)
+            crossed = piece.first_crossing(solver)
             limit = crossed[0] if crossed else solver.t
             while row < len(times) and times[row] <= limit:
-                out[row] = _at(body, ground, current, solver, float(times[row]), tolerance)
+                out[row] = piece.origin.plus(piece.change_until(solver, float(times[row])))
                 row += 1
+            if not crossed:
+                piece.origin, solver.y = piece.origin.moved(solver.y), np.zeros_like(start)
         if crossed:
             step = max(1e-9, 0.2 * (solver.t - solver.t_old))
-            (t, changed), y = crossed, _at(body, ground, current, solver, crossed[0], tolerance)
-            cases = current ^ changed
-            rotation = changed[BEYOND:].any(axis=0)  # at another face the cases are determined again
-            for _ in range(2):
-                cases[:BEYOND, rotation] = (margins(body, ground, cases, y) > 0.0)[:BEYOND, rotation]
-            new_contact = cases[0] & (changed[0] | changed[2])  # new contacts
-            now = margins(body, ground, cases, y) > 0.0
-            now[3] |= new_contact  # a point slides until it carries load
-            now[2] |= changed[0]
-            cases[1:BEYOND, new_contact] = np.where(
-                changed[1:, new_contact], cases[1:, new_contact], now[1:, new_contact]
-            )[: BEYOND - 1]
+            t, changed = crossed
+            origin = piece.origin.moved(piece.change_until(solver, t))
+            cases = _cases_after(body, ground, cases, changed, origin.value)
             events += 1
     return out, events
 
 
-def _at(
-    body: LandingBody, ground: LandingGround, cases: np.ndarray, solver: DOP853, t: float, tolerance: float
+def _cases_after(
+    body: LandingBody, ground: LandingGround, before: np.ndarray, changed: np.ndarray, y: np.ndarray
 ) -> np.ndarray:
-    """Return the state at a time within the last step, integrated once more: more exact than its interpolation."""
-    if t <= solver.t_old:
-        return solver.y_old
-    again = DOP853(
-        lambda _, x: rate(body, ground, cases, x), solver.t_old, solver.y_old, t, rtol=tolerance, atol=tolerance,
-        first_step=t - solver.t_old,
-    )  # fmt: skip
-    while again.status == "running":
-        again.step()
-    return again.y
+    """Return the cases after an event."""
+    cases = before ^ changed
+    rotation = changed[BEYOND:].any(axis=0)  # at another face the cases are determined again
+    for _ in range(2):
+        cases[:BEYOND, rotation] = (margins(body, ground, cases, y) > 0.0)[:BEYOND, rotation]
+    new_contact = cases[0] & (changed[0] | changed[2])  # new contacts
+    now = margins(body, ground, cases, y) > 0.0
+    now[3] |= new_contact  # a point slides until it carries load
+    now[2] |= changed[0]
+    cases[1:BEYOND, new_contact] = np.where(changed[1:, new_contact], cases[1:, new_contact], now[1:, new_contact])[
+        : BEYOND - 1
+    ]
+    return cases
 
 
-def _first_crossing(
-    body: LandingBody, ground: LandingGround, cases: np.ndarray, solver: DOP853
-) -> tuple[float, np.ndarray] | None:
-    """Return (time, cases that change) of the first event within the last step; None if there is none."""
-
-    def wrong(y: np.ndarray) -> np.ndarray:
-        """Positive where a case does not hold any more; the friction of points that do not press has none."""
-        result = np.where(cases, -1.0, 1.0) * margins(body, ground, cases, y)
-        result[1:BEYOND, ~cases[0]] = -1.0  # in the air only the touch and the faces count
-        result[3, ~cases[2]] = -1.0
-        return result
-
-    at_end = wrong(solver.y)
-    points = [solver.t]
-    near = np.abs(margins(body, ground, cases, solver.y)[[0, BEYOND]]).min() < GRAZING
-    dense = None
-    if near:
-        dense = solver.dense_output()
-        points = list(np.linspace(solver.t_old, solver.t, 9)[1:])
-    before = solver.t_old
-    for point in points:
-        values = at_end if point == solver.t else wrong(dense(point))  # type: ignore[misc]
-        if (values > 0.0).any():
-            dense = dense or solver.dense_output()
-            roots = [(_root(wrong, dense, before, point, k), k) for k in zip(*np.nonzero(values > 0.0), strict=True)]
-            t = min(roots)[0]
-            changed = np.zeros_like(cases)
-            for root, k in roots:
-                changed[k] = root == t
-            return t, changed
-        before = point
-    return None
-
-
-def _root(wrong, dense, before: float, after: float, k) -> float:  # type: ignore[no-untyped-def]
+def _root(
+    wrong: Callable[[np.ndarray], np.ndarray], dense: Callable[[float], np.ndarray], before: float, after: float,
+    k: tuple[int, ...],
+) -> float:  # fmt: skip
     """Return the time at which a value becomes positive; that before if it is positive there, by round-off."""
     if wrong(dense(before))[k] >= 0.0:
         return before
