@@ -106,7 +106,7 @@ def wrapper(part: ExportedPart, name: str) -> str:
         f"        return sample;\n    }}\n"
         for p in part.outputs
     )
-    cls = "".join(word.capitalize() for word in name.split("_"))
+    cls = class_name(name)
     upper = name.upper()
     return f"""// C++ wrapper of {name}.h. Written by `lapwing export-library`.
 #pragma once
@@ -171,6 +171,11 @@ class {cls} {{
     std::unique_ptr<{name}, Deleter> self_;
 }};
 """
+
+
+def class_name(name: str) -> str:
+    """Return the name of the C++ class: "hover_plant" becomes "HoverPlant"."""
+    return "".join(word.capitalize() for word in name.split("_"))
 
 
 def identifier(port: BoundaryPort) -> str:

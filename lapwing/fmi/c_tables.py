@@ -12,7 +12,9 @@ _TYPES = {kinds.REAL: "REAL", kinds.INTEGER: "INTEGER", kinds.BOOLEAN: "BOOLEAN"
 CONTACT = ".ground_contact"  # suffix of outputs whose change is an event
 
 
-def tables(part: ExportedPart, symbols: Sequence[str | None], variables: Sequence[Variable], image: str) -> str:
+def tables(
+    part: ExportedPart, symbols: Sequence[str | None], variables: Sequence[Variable], image: str, arrays: int
+) -> str:
     """Return the text of tables.h.
 
     Args:
@@ -20,6 +22,7 @@ def tables(part: ExportedPart, symbols: Sequence[str | None], variables: Sequenc
         symbols: function of each block; None for a Python block.
         variables: variables in the order of their references from 1.
         image: symbol of the image.
+        arrays: size of the arrays that blocks create in a step [bytes].
     """
     actions, writes, written = _actions(part)
     staged = [float(x) for port in part.inputs for x in pack_row(port.port.like)]
@@ -40,6 +43,7 @@ def tables(part: ExportedPart, symbols: Sequence[str | None], variables: Sequenc
         "VARIABLES": len(variables) + 1,
         "EVENTS": len(contacts),
         "FAILURES": len(part.events),
+        "ARRAYS": arrays,
         "PART_IMAGE": image,
         "PART_INTERVAL": f"(1.0 / {part.setup.rate})",
     }

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from lapwing.cosim.config.provenance import package_version
 from lapwing.cosim.config.run_config import RunConfig
-from lapwing.fmi.c_header import header, identifier, wrapper
+from lapwing.fmi.c_header import class_name, header, identifier, wrapper
 from lapwing.fmi.exported_part import ExportedPart, export_part
 from lapwing.fmi.machine_code import PORTABLE
 from lapwing.fmi.native_build import NATIVE, archive, build_folder
@@ -124,15 +124,11 @@ def export_library(setup: RunConfig, part_name: str, out: Path, cpu: str = PORTA
         f"lib/cmake/{name}/{name}-config.cmake": _CMAKE.format(**fields),
         f"lib/pkgconfig/{name}.pc": _PKG_CONFIG.format(**fields),
         "example/CMakeLists.txt": _EXAMPLE_CMAKE.format(**fields),
-        "example/main.cpp": _EXAMPLE.format(cls=_class(name), report=_report(part), **fields),
+        "example/main.cpp": _EXAMPLE.format(cls=class_name(name), report=_report(part), **fields),
     }
     for path, text in texts.items():
         (out / path).write_text(text, encoding="utf-8")
     return part
-
-
-def _class(name: str) -> str:
-    return "".join(word.capitalize() for word in name.split("_"))
 
 
 def _report(part: ExportedPart) -> str:

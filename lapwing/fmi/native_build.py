@@ -20,6 +20,9 @@ from lapwing.fmi.variables import Variable
 NATIVE = Path(__file__).parent / "native"
 FLAGS = ("-std=gnu11", "-Wall", "-Werror=implicit", "-O2", "-fPIC", "-fvisibility=hidden", "-ffp-contract=off")
 
+CREATES_ARRAYS = "NRT_MemInfo_alloc_aligned"  # symbol that blocks with arrays of their own call
+ARRAYS = 1 << 18  # [bytes] of the stack for these arrays; five bodies in Euler angles use 44 kB
+
 
 @dataclass(frozen=True)
 class BuildFolder:
@@ -57,8 +60,8 @@ class BuildFolder:
 # symbols of the runtime that must differ between static libraries of one program
 _SYMBOLS = (
     "part_size", "part_reset", "part_relocate", "part_unlink", "part_advance", "part_staged", "part_row",
-    "part_number", "part_set_number", "part_variable", "numba_frexp", "NRT_MemInfo_call_dtor", "NRT_incref",
-    "NRT_decref",
+    "part_number", "part_set_number", "part_variable", "numba_frexp", "numba_attempt_nocopy_reshape", CREATES_ARRAYS,
+    "NRT_MemInfo_call_dtor", "NRT_incref", "NRT_decref",
 )  # fmt: skip
 
 
@@ -87,7 +90,9 @@ def build_folder(part: ExportedPart, variables: Sequence[Variable], prefix: str,
                 names = {each: f"{prefix}_{each}" for each in _SYMBOLS}
                 objects[-1].write_bytes(step_code(block.part, block.bound, symbol, cpu, names))
             symbols.append(emitted[block.bound.function] if block.bound else None)
-        (folder / "tables.h").write_text(tables(part, symbols, variables, f"{prefix}_image"), encoding="ascii")
+        creates = any(CREATES_ARRAYS.encode() in path.read_bytes() for path in objects)
+        text = tables(part, symbols, variables, f"{prefix}_image", ARRAYS if creates else 0)
+        (folder / "tables.h").write_text(text, encoding="ascii")
         yield BuildFolder(folder, tuple(objects), prefix)
 
 

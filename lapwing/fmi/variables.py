@@ -1,6 +1,7 @@
 """Variables of an exported part: the columns of its ports, its parameters and its state."""
 
 import struct
+from math import isnan
 from typing import Any, NamedTuple
 
 from numba.core import types
@@ -10,6 +11,7 @@ from lapwing.dynamics.vehicles.propeller_failures import Failure
 from lapwing.fmi.exported_part import BoundaryPort, ExportedPart
 from lapwing.kernels.row_packing import pack_row
 from lapwing.services.common.field_units import field_unit
+from lapwing.services.common.ports import EFFECT
 
 INPUT, OUTPUT, PARAMETER, STATE = "input", "output", "parameter", "local"
 REAL, INTEGER, BOOLEAN = "real", "integer", "boolean"
@@ -32,10 +34,10 @@ def variables_of(part: ExportedPart) -> list[Variable]:
     result: list[Variable] = []
     staged = 0
     for port in part.inputs:
-        result += _columns(port, INPUT, 0, staged)
+        result += _modelled(port, _columns(port, INPUT, 0, staged))
         staged += len(pack_row(port.port.like))
     for k, port in enumerate(part.outputs):
-        result += _columns(port, OUTPUT, k, 0)
+        result += _modelled(port, _columns(port, OUTPUT, k, 0))
     for leaf in part.image.leaves:
         block, _, path = leaf.path.partition("|")
         kind, _, rest = path.partition(".")
@@ -54,6 +56,16 @@ def variables_of(part: ExportedPart) -> list[Variable]:
 def column_names(port: Port) -> list[str]:
     """Return the names of the variables of a port, one for each column."""
     return [v.name for v in _columns(BoundaryPort(port, 0, 1, port.name), INPUT, 0, 0)]
+
+
+def _modelled(port: BoundaryPort, columns: list[Variable]) -> list[Variable]:
+    """Return the columns of a port without those that no effect of the scene models, such as the battery's temperature.
+
+    Named inputs of effects are NaN until they are set, and an FMU may compute what no effect models.
+    """
+    if port.port.name.rpartition("/")[2].startswith(EFFECT) or port.ring != port.port.name:
+        return columns
+    return [v for v, x in zip(columns, pack_row(port.port.like), strict=True) if not isnan(x)]
 
 
 def structured_name(name: str) -> str:

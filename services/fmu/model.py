@@ -8,6 +8,8 @@ from typing import Any, NamedTuple
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.dynamics import integrators
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.kernels import math
+from lapwing.kernels.row_packing import pack_row
 from lapwing.services.common.field_units import field_unit, parse_unit
 from lapwing.services.common.ports import EFFECT
 from lapwing.services.fmu.description import Description, NamedUnit, content_of, start_elements
@@ -64,7 +66,9 @@ class ImportedFmu:
         table, inputs, outputs, start = self.table, [], [], []
         for variable, source in table.inputs.items():
             key = f"{self.key}.inputs.{variable}"
-            place = _columns_of_fmu(key, source, self.name, fmus) or _columns(key, source, ports)
+            place = _columns_of_fmu(key, source, self.name, fmus) or _modelled(
+                key, source, _columns(key, source, ports), ports
+            )
             inputs += self._connections(key, variable, "input", source, place)
         for column, variable in table.outputs.items():
             key = f'{self.key}.outputs."{column}"'
@@ -159,6 +163,14 @@ def _columns(key: str, name: str, ports: Mapping[str, Port]) -> _Place:
     if not below:
         raise ConfigError.unknown(key, "column", name, [f"{port_name}.{leaf}" for leaf in leaves])
     return _Place(port_name, [places[leaf] for leaf in below], [leaves[leaf] for leaf in below])
+
+
+def _modelled(key: str, name: str, place: _Place, ports: Mapping[str, Port]) -> _Place:
+    """Return a place. Raise ConfigError if no effect of the scene models one of its columns, which are NaN."""
+    row = pack_row(ports[place.port].like)
+    if any(math.isnan(row[k]) for k in place.columns):
+        raise ConfigError(key, f"no effect of the scene models {name}", "another column, or an effect such as battery")
+    return place
 
 
 def _unit(owner: type | None, field: str) -> NamedUnit | None:

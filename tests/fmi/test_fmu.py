@@ -87,6 +87,26 @@ def test_archive_has_description_binary_and_documentation(plant: Path) -> None:
     assert model.defaultExperiment.stepSize == "0.004"
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("effect", "columns"),
+    [
+        (None, ["voltage", "current"]),
+        ("battery", ["charge", "voltage", "current"]),
+        ("battery_thevenin", ["charge", "voltage", "current", "temperature"]),
+    ],
+)
+def test_variables_without_model_are_left_out(effect: str | None, columns: list[str]) -> None:
+    """They would be NaN, which importers reject or plot as gaps."""
+    setup = scene_config("hover", **({f"effects.{effect}": "{}"} if effect else {}))
+    for part, causality in (("plant", "output"), ("autopilot", "input")):
+        variables = variables_of(export_part(setup, part))
+        names = [v.name for v in variables if v.name.startswith("battery.")]
+        assert names == [f"battery.{each}" for each in columns]
+        assert {v.causality for v in variables if v.name in names} == {causality}
+        assert all(math.isfinite(v.start) for v in variables if v.start is not None and v.causality == "input")
+
+
 HEIGHT, MOTOR = "truth.position_world[2]", "actuators.motor_voltage[0]"
 START = "state.plant.vehicle.motion.position_world[2]"
 

@@ -53,7 +53,7 @@ from numba.core.errors import TypingError
 
 from lapwing.dynamics.effects._axes import beside, in_world
 from lapwing.dynamics.vector import add, apply
-from lapwing.kernels import DispatchTable, always_inline
+from lapwing.kernels import DispatchTable, always_inline, math, python_function
 from lapwing.kernels.codegen import compile_source, generic
 
 HOOKS: dict[str, DispatchTable] = {}
@@ -101,6 +101,21 @@ wind = _hook("wind")
 def initial_discrete_state(e: Any) -> tuple:
     """Return the discrete state of an effect before the first tick."""
     return e.initial_discrete_state() if hasattr(e, "initial_discrete_state") else ()
+
+
+def initial_battery_state(effects: tuple, memory: tuple, voltage: float) -> tuple:
+    """Return (charge, voltage [V], current [A], temperature [K]) before the first tick; NaN: not modelled.
+
+    Args:
+        effects: parameters of the effects.
+        memory: their discrete state.
+        voltage: voltage without a battery [V].
+    """
+    result = (math.nan, voltage, 0.0, math.nan)
+    for e, own in zip(effects, memory, strict=True):
+        if type(e) in HOOKS["battery_state"]:
+            result = python_function(HOOKS["battery_state"][type(e)])(e, own)
+    return result
 
 
 def _generate_calls(

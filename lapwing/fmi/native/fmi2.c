@@ -1,4 +1,10 @@
 /* FMI 2.0 co-simulation. Signatures follow the standard; unused functions return an error. */
+#define fmi_get_state fmi2GetFMUstate
+#define fmi_set_state fmi2SetFMUstate
+#define fmi_free_state fmi2FreeFMUstate
+#define fmi_serialized_state_size fmi2SerializedFMUstateSize
+#define fmi_serialize_state fmi2SerializeFMUstate
+#define fmi_deserialize_state fmi2DeSerializeFMUstate
 #include "fmi_common.h"
 
 typedef struct {
@@ -90,38 +96,6 @@ API int fmi2CancelStep(void *self) { return fail(self, "cancelStep: steps are ne
 ACCESS(Real, double, REAL, x)
 ACCESS(Integer, int32_t, INTEGER, x >= -2147483648.0 && x <= 2147483647.0 ? (int32_t)x : INT32_MIN)
 ACCESS(Boolean, int32_t, BOOLEAN, x != 0)
-
-API int fmi2GetFMUstate(void *self, void **state) {
-    if (!*state && !(*state = malloc(saved_size()))) return fail(self, "not enough memory for a state");
-    save(self, *state);
-    return OK;
-}
-API int fmi2SetFMUstate(void *self, void *state) {
-    if (!is_saved(state, saved_size())) return fail(self, "the state is not one of this FMU");
-    load(self, state);
-    return OK;
-}
-API int fmi2FreeFMUstate(void *self, void **state) {
-    (void)self;
-    if (state) free(*state), *state = NULL;
-    return OK;
-}
-API int fmi2SerializedFMUstateSize(void *self, void *state, size_t *size) {
-    (void)self, (void)state;
-    *size = saved_size();
-    return OK;
-}
-API int fmi2SerializeFMUstate(void *self, void *state, uint8_t bytes[], size_t size) {
-    if (!is_saved(state, size)) return fail(self, "the state is not one of this FMU");
-    memcpy(bytes, state, size);
-    return OK;
-}
-API int fmi2DeSerializeFMUstate(void *self, const uint8_t bytes[], size_t size, void **state) {
-    if (!is_saved(bytes, size)) return fail(self, "the bytes are not a state of this FMU");
-    if (!*state && !(*state = malloc(size))) return fail(self, "not enough memory for a state");
-    memcpy(*state, bytes, size);
-    return OK;
-}
 
 enum { DO_STEP_STATUS, PENDING, LAST_SUCCESSFUL_TIME, TERMINATED_STATUS };
 API int fmi2GetRealStatus(void *self, int kind, double *value) {

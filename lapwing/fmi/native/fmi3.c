@@ -1,4 +1,10 @@
 /* FMI 3.0 co-simulation. Signatures follow the standard; unused functions return an error. */
+#define fmi_get_state fmi3GetFMUState
+#define fmi_set_state fmi3SetFMUState
+#define fmi_free_state fmi3FreeFMUState
+#define fmi_serialized_state_size fmi3SerializedFMUStateSize
+#define fmi_serialize_state fmi3SerializeFMUState
+#define fmi_deserialize_state fmi3DeserializeFMUState
 #include "fmi_common.h"
 
 typedef void log_message(void *environment, int status, const char *category, const char *message);
@@ -69,9 +75,9 @@ API int fmi3EnterStepMode(void *self) {
 
 API int fmi3UpdateDiscreteStates(void *self, uint8_t *again, uint8_t *terminate, uint8_t *nominals, uint8_t *states,
                                  uint8_t *has_event, double *event_time) {
-    (void)self;
-    *again = *terminate = *nominals = *states = *has_event = 0;
-    *event_time = 0;
+    *again = *nominals = *states = 0;
+    *terminate = (uint8_t)STATE(((instance *)self)->memory)->finished;
+    *has_event = (uint8_t)next_failure(self, event_time);
     return OK;
 }
 API int fmi3EvaluateDiscreteStates(void *self) { return (void)self, OK; }
@@ -95,20 +101,6 @@ API int fmi3DoStep(void *self_, double from, double step, uint8_t no_earlier_sta
     return status;
 }
 
-API int fmi3GetFloat64(void *self, const uint32_t references[], size_t count, double values[], size_t size) {
-    if (size != count) return fail(self, "%zu values for %zu scalar variables", size, count);
-    for (size_t i = 0; i < count; i++)
-        if (get_number(self, references[i], REAL, &values[i])) return ERROR;
-    return OK;
-}
-
-API int fmi3SetFloat64(void *self, const uint32_t references[], size_t count, const double values[], size_t size) {
-    if (size != count) return fail(self, "%zu values for %zu scalar variables", size, count);
-    for (size_t i = 0; i < count; i++)
-        if (set_number(self, references[i], REAL, values[i])) return ERROR;
-    return OK;
-}
-
 #define ACCESS(Type, c_type, kind, from_double)                                                                        \
     API int fmi3Get##Type(void *self, const uint32_t references[], size_t count, c_type values[], size_t size) {       \
         if (size != count) return fail(self, "%zu values for %zu scalar variables", size, count);                      \
@@ -125,40 +117,9 @@ API int fmi3SetFloat64(void *self, const uint32_t references[], size_t count, co
             if (set_number(self, references[i], kind, (double)values[i])) return ERROR;                                \
         return OK;                                                                                                     \
     }
+ACCESS(Float64, double, REAL, x)
 ACCESS(Int32, int32_t, INTEGER, x >= -2147483648.0 && x <= 2147483647.0 ? (int32_t)x : INT32_MIN)
 ACCESS(Boolean, uint8_t, BOOLEAN, x != 0)
-
-API int fmi3GetFMUState(void *self, void **state) {
-    if (!*state && !(*state = malloc(saved_size()))) return fail(self, "not enough memory for a state");
-    save(self, *state);
-    return OK;
-}
-API int fmi3SetFMUState(void *self, void *state) {
-    if (!is_saved(state, saved_size())) return fail(self, "the state is not one of this FMU");
-    load(self, state);
-    return OK;
-}
-API int fmi3FreeFMUState(void *self, void **state) {
-    (void)self;
-    if (state) free(*state), *state = NULL;
-    return OK;
-}
-API int fmi3SerializedFMUStateSize(void *self, void *state, size_t *size) {
-    (void)self, (void)state;
-    *size = saved_size();
-    return OK;
-}
-API int fmi3SerializeFMUState(void *self, void *state, uint8_t bytes[], size_t size) {
-    if (!is_saved(state, size)) return fail(self, "the state is not one of this FMU");
-    memcpy(bytes, state, size);
-    return OK;
-}
-API int fmi3DeserializeFMUState(void *self, const uint8_t bytes[], size_t size, void **state) {
-    if (!is_saved(bytes, size)) return fail(self, "the bytes are not a state of this FMU");
-    if (!*state && !(*state = malloc(size))) return fail(self, "not enough memory for a state");
-    memcpy(*state, bytes, size);
-    return OK;
-}
 
 #define UNSUPPORTED(name) \
     API int name(void) { return ERROR; }

@@ -112,6 +112,16 @@ static int is_failure(int64_t tick) {
     return 0;
 }
 
+/* Return 1 and the time [s] of the next propeller failure, 0 if none follows. */
+static int next_failure(const instance *self, double *time) {
+    for (size_t k = 0; k < FAILURES; k++)
+        if (part_failures[k] > STATE(self->memory)->tick) {
+            *time = self->start + part_failures[k] * PART_INTERVAL;
+            return 1;
+        }
+    return 0;
+}
+
 /* Step to the end of a communication step. *event: a ground contact changed or a propeller failed, and the step may end
    early. */
 static int step_to(instance *self, double from, double step, int *event) {
@@ -183,6 +193,39 @@ static void load(instance *self, const void *state) {
     self->mode = (int)header.mode, self->start = header.start, self->time = header.time, self->warned = header.warned;
     memcpy(self->memory, (const char *)state + sizeof header, part_size());
     part_relocate(self->memory);
+}
+
+/* Functions of the standard; each version defines their names. */
+API int fmi_get_state(void *self, void **state) {
+    if (!*state && !(*state = malloc(saved_size()))) return fail(self, "not enough memory for a state");
+    save(self, *state);
+    return OK;
+}
+API int fmi_set_state(void *self, void *state) {
+    if (!is_saved(state, saved_size())) return fail(self, "the state is not one of this FMU");
+    load(self, state);
+    return OK;
+}
+API int fmi_free_state(void *self, void **state) {
+    (void)self;
+    if (state) free(*state), *state = NULL;
+    return OK;
+}
+API int fmi_serialized_state_size(void *self, void *state, size_t *size) {
+    (void)self, (void)state;
+    *size = saved_size();
+    return OK;
+}
+API int fmi_serialize_state(void *self, void *state, uint8_t bytes[], size_t size) {
+    if (!is_saved(state, size)) return fail(self, "the state is not one of this FMU");
+    memcpy(bytes, state, size);
+    return OK;
+}
+API int fmi_deserialize_state(void *self, const uint8_t bytes[], size_t size, void **state) {
+    if (!is_saved(bytes, size)) return fail(self, "the bytes are not a state of this FMU");
+    if (!*state && !(*state = malloc(size))) return fail(self, "not enough memory for a state");
+    memcpy(*state, bytes, size);
+    return OK;
 }
 
 #endif

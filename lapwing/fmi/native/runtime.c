@@ -5,6 +5,10 @@
 
 #include "tables.h"
 
+#if ARRAYS
+#include "step_arrays.h"
+#endif
+
 enum { CONTINUE, WAKE_PYTHON, FINISHED, NON_FINITE }; /* signals of lapwing/cosim/diagram/compiled_block.py */
 enum { LATCHED };
 
@@ -76,6 +80,10 @@ static void act(void *memory, int64_t tick, int64_t k, int woken) {
 int part_advance(void *memory) {
     part_state *s = STATE(memory);
     if (s->failed) return PART_FAILED;
+#if ARRAYS
+    unsigned char of_step[ARRAYS];
+    arrays_begin(of_step, sizeof of_step);
+#endif
     int64_t tick = s->tick + 1, woken = -1;
     for (size_t i = 0; i < INPUTS; i++) {
         const port *p = &part_inputs[i];
@@ -160,6 +168,8 @@ double numba_frexp(double x, int *exponent) {
     return x;
 }
 
+#if !ARRAYS
 void NRT_MemInfo_call_dtor(void *info) { (void)info; } /* memory of an instance is never released by a block */
+#endif
 void NRT_incref(void *info) { (void)info; }
 void NRT_decref(void *info) { (void)info; }

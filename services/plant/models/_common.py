@@ -9,6 +9,7 @@ from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics import integrators
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.effects._hooks import initial_battery_state
 from lapwing.dynamics.integrators import check_start
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.noise import Key, stream_key
@@ -115,11 +116,12 @@ def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceConfig:
     truth = TrueState(
         rotor_speed=zero, motor_voltage=zero, motor_current=zero, motor_power=zero, rotor_thrust=zero, rotor_torque=zero
     )
+    battery = BatteryReading(*initial_battery_state(p.effects, start.vehicle.memory, p.layout.max_voltage))
     delay, external = exchange.loop_delay, effect_inputs.ports_of(scene, p.effects)
     return ServiceConfig(
         PlantSetup("rigid_body", core, start, message_contents(scene, odometry=True, battery=frame.battery)),
         (InputPort(ports.ACTUATORS, delay), InputPort(ports.STATUS, delay), *(InputPort(i, delay) for i in external)),
-        (Port(ports.TRUTH, truth), Port(ports.BATTERY, BatteryReading(), rate_ticks(scene, "battery"))),
+        (Port(ports.TRUTH, truth), Port(ports.BATTERY, battery, rate_ticks(scene, "battery"))),
     )
 
 

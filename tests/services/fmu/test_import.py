@@ -370,9 +370,10 @@ def test_option_of_other_interface_is_rejected(folder: Path, line: str, message:
         ('"u[2]" = "actuators.motor_voltage.0"', "u[2]: no such element; expected indices from 0 of an array of 2"),
         ('"h[0]" = "actuators.motor_voltage.0"', "h[0] has causality output"),
         ('v = "actuators.motor_voltage.0"', "v has causality output; expected an input of the FMU"),
+        ('"u[0]" = "battery.charge"', "no effect of the scene models battery.charge; expected another column, or an"),
     ],
 )
-def test_array_connection_that_does_not_fit_is_rejected(tmp_path: Path, line: str, message: str) -> None:
+def test_connection_that_does_not_fit_is_rejected(tmp_path: Path, line: str, message: str) -> None:
     write_event_fmu(tmp_path / "ball.fmu")
     scene = scene_with(tmp_path, "ball.fmu", line, '"trajectory.position_world.2" = "h"')
     with pytest.raises(ValueError, match=r"services\.motor") as error:
