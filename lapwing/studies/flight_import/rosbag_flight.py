@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from lapwing.studies.flight_import.channels import FLU, Channels, to_recording
+from lapwing.studies.flight_import.message_columns import NumberRows, RowLengthError
 from lapwing.studies.flight_import.recording import Recording, Series
 from lapwing.studies.flight_import.rotation_arrays import from_ned_frd, ned_to_enu, rotate, unit
 
@@ -110,7 +111,7 @@ def _series(path: Path) -> tuple[dict[str, Series], tuple[str, ...]]:
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise ValueError(f"{path}: a rosbag2 needs rosbags; install lapwing[rosbag]") from None
-    rows: dict[str, list[tuple[float, Any]]] = {}
+    rows: dict[str, NumberRows] = {}
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as bag:
             largest: dict[str, Any] = {}
@@ -124,15 +125,15 @@ def _series(path: Path) -> tuple[dict[str, Series], tuple[str, ...]]:
             for connection, received, raw in bag.messages(list(largest.values())):
                 message: Any = bag.deserialize(raw, connection.msgtype)
                 values = FIELDS[connection.msgtype](message)
-                rows.setdefault(connection.msgtype, []).append((_time(message, received), values))
+                rows.setdefault(connection.msgtype, NumberRows()).append((_time(message, received), *values))
+    except RowLengthError:
+        raise ValueError(f"{path}: a topic's arrays change their length; record the flight again") from None
     except Exception:  # rosbags raises exceptions of many types
         raise ValueError(f"{path}: is not a readable rosbag2 folder; expected metadata.yaml and its messages") from None
-    try:
-        return {
-            k: Series.of([t for t, _ in r], [list(v) for _, v in r]) for k, r in rows.items() if len(r[0][1])
-        }, tuple(unknown)
-    except ValueError:
-        raise ValueError(f"{path}: a topic's arrays change their length; record the flight again") from None
+    tables = {kind: numbers.to_array() for kind, numbers in rows.items()}
+    return {kind: Series.of(table[:, 0], table[:, 1:]) for kind, table in tables.items() if table.shape[1] > 1}, tuple(
+        unknown
+    )
 
 
 def _time(message: Any, received: int) -> float:
