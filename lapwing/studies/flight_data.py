@@ -166,6 +166,11 @@ class FlightData(FlightTopics):
         return f"<Flight of {self.metadata.get('scene', self.origin.source)}: {text}>"
 
     @cached_property
+    def located(self) -> bool:
+        """True if the log has a position of the vehicle; an imported flight may have none."""
+        return bool(np.isfinite(self.truth.position).any())
+
+    @cached_property
     def reference(self) -> np.ndarray:
         """Reference x, y, z [m], roll, pitch, yaw [rad] at the first n times of "ground_truth", shape (n, 6).
 

@@ -38,6 +38,9 @@ def facts(flight: FlightData) -> dict[str, str]:
         if "exchange_rate" in metadata
         else "",
         "deadlines missed": f"{metadata[MISSED]} ticks; at most {metadata[WORST]} late" if MISSED in metadata else "",
+        "imported from": metadata.get("imported_from", ""),
+        "marked samples": metadata.get("faults", ""),
+        "notes": metadata.get("notes", ""),
         "version": metadata.get("version", ""),
         "commit": metadata.get("commit", ""),
         "digest": flight.digest or "none: the log is incomplete",
