@@ -18,13 +18,13 @@ def run(*arguments):
     return subprocess.run([sys.executable, "-m", "lapwing", *map(str, arguments)], capture_output=True, text=True)
 
 
-def write_blackbox(path, flight, header=None, **others):
-    """Write a flight as `blackbox_decode` does, by default with DShot outputs; other columns by name."""
+def write_blackbox(path, flight, offset=48.0, full_scale=1999.0, **others):
+    """Write a flight as `blackbox_decode` does, by default with DShot outputs, and other columns."""
     columns = {
         "loopIteration": np.arange(SAMPLES), " time (us)": 1e4 * np.arange(SAMPLES),
         **{f" gyroADC[{k}]": np.degrees(flight.omega[:, k]) for k in range(3)},
         **{f" accSmooth[{k}]": 2048.0 * flight.specific_force[:, k] / GRAVITY for k in range(3)},
-        **{f" motor[{k}]": 48.0 + 1999.0 * flight.motor_voltage[:, k] / BATTERY for k in range(4)},
+        **{f" motor[{k}]": offset + full_scale * flight.motor_voltage[:, k] / BATTERY for k in range(4)},
         " vbatLatest (V)": flight.battery_voltage,
         **others,
     }  # fmt: skip
@@ -69,7 +69,15 @@ def test_unmeasured_quantities_of_a_log_are_nan(tmp_path, flight):
     assert not log.located
     assert np.isnan(log.truth.attitude).all()
     assert log.truth.angular_velocity == pytest.approx(flight.omega, abs=1e-6)
-    assert np.isnan(log.battery.percentage).all()
+    assert np.isnan(log.topic("battery").percentage).all()
     again = open_flight(tmp_path / "f.mcap")
     assert again.valid.all()
     assert again.omega == pytest.approx(flight.omega[: len(again)], abs=1e-6)
+
+
+def test_pulses_are_scaled_by_their_own_mapping(tmp_path, flight):
+    source = write_blackbox(tmp_path / "f.csv", flight, 1000.0, 1000.0)
+    result = open_flight(source, "betaflight_pwm")
+    assert result.motor_voltage == pytest.approx(flight.motor_voltage, abs=1e-6)
+    assert not any("suspected" in note for note in result.notes)
+    assert any("suspected" in note for note in open_flight(source, "betaflight").notes)
