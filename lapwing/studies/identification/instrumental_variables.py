@@ -33,12 +33,9 @@ def loss(residual: np.ndarray) -> np.ndarray:
 def moments(residual: np.ndarray, derivatives: np.ndarray, instruments: np.ndarray, clusters: np.ndarray) -> Moments:
     """Return the step that makes instruments and residuals uncorrelated, and the errors of its solution.
 
-    The covariance is that of the jackknife over n clusters, linearised: without cluster g, whose share of the
-    information is A_g and of the moments s_g, the solution moves by (A - A_g)^-1 s_g. In the sandwich estimator a
-    cluster of much information draws the solution to its own errors, and these seem smaller than they are; the factor
-    n / (n - k) corrects that for equal clusters alone (MacKinnon, Nielsen and Webb, Journal of Econometrics 232, 2023,
-    section 3). Standard errors are scaled so that two of them cover as much of Student's distribution with n - 1
-    degrees of freedom as of a normal one; with a single cluster they are infinite.
+    Standard errors come from the sandwich estimator over clusters, with the small-sample factor n / (n - k) of the
+    variance for n clusters. They are scaled so that two of them cover as much of Student's distribution as of a
+    normal one; with a single cluster they are infinite.
 
     Args:
         residual: shape (m,).
@@ -49,25 +46,22 @@ def moments(residual: np.ndarray, derivatives: np.ndarray, instruments: np.ndarr
     k = derivatives.shape[1]
     square = 1.0 + (residual / LOSS_SCALE) ** 2
     weight = (square**-1.5)[:, None]  # second derivative of the loss
+    total = np.zeros((int(clusters.max()) + 1, k))
+    score = (instruments * (residual * square**-0.5)[:, None]).reshape(len(clusters), -1, k).sum(axis=1)
+    np.add.at(total, clusters, score)
     size = (derivatives**2 * weight).sum(axis=0)
     dead = size <= NO_INFLUENCE * size.max(initial=0.0)
     scale = np.sqrt(np.where(dead, 1.0, size))
-    score = (instruments * (residual * square**-0.5)[:, None] / scale).reshape(len(clusters), -1, k)
-    n = int(clusters.max()) + 1
-    total, shares = np.zeros((n, k)), np.zeros((n, k, k))
-    np.add.at(total, clusters, score.sum(axis=1))
-    pair = (v.reshape(len(clusters), -1, k) for v in (instruments / scale, derivatives * weight / scale))
-    np.add.at(shares, clusters, np.einsum("wmi,wmj->wij", *pair))
-    information = shares.sum(axis=0)
+    information = instruments.T @ (derivatives * weight) / np.outer(scale, scale)
     left, values, right = np.linalg.svd(information)
-    rest_left, rest_values, rest_right = np.linalg.svd(information - shares)
-    moved = np.einsum("gji,gj,glj,gl->gi", rest_right, 1.0 / np.maximum(rest_values, SMALLEST), rest_left, total)
-    moved = (moved - moved.mean(axis=0)) / scale
-    covariance = moved.T @ moved * (n - 1) / n
+    inverse = (right.T / np.maximum(values, SMALLEST)) @ left.T / np.outer(scale, scale)
+    centred = total - total.mean(axis=0)
+    factor = len(total) / max(len(total) - k, 1)
+    covariance = inverse @ (centred.T @ centred * factor) @ inverse.T
     spread = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     correlation = np.where(dead | dead[:, None], np.eye(k), covariance / np.outer(spread, spread))
-    widening = student.ppf(norm.cdf(2.0), n - 1) / 2.0 if n > 1 else np.inf
-    deviation = np.where(dead, np.inf, spread * widening)
+    unknown = dead | (len(total) == 1)  # one cluster has no spread
+    deviation = np.where(unknown, np.inf, spread * student.ppf(norm.cdf(2.0), max(len(total) - k, 1)) / 2.0)
     known = np.where(values > SINGULAR, 1.0 / np.maximum(values, SINGULAR), 0.0)
-    step = -((right.T * known) @ left.T @ total.sum(axis=0)) / scale
+    step = -((right.T * known) @ left.T / np.outer(scale, scale)) @ total.sum(axis=0)
     return Moments(np.clip(step, -deviation, deviation), deviation, correlation)
