@@ -140,6 +140,9 @@ def import_(
     ],
     out: Annotated[Path, typer.Option(metavar="FILE", help="the log to write (.mcap)")],
     mapping: MappingName = None,
+    vehicle: Annotated[
+        str | None, typer.Option(metavar="NAME", help="namespace of the vehicle in a rosbag2 with several")
+    ] = None,
 ) -> None:
     """Convert a recorded flight from an autopilot into a log.
 
@@ -154,7 +157,7 @@ def import_(
         raise ValueError(f"--out {out}: expected a name that ends in .mcap")
     if flight.suffix == ".mcap":
         raise ValueError(f"{flight}: is a log already; for a file of a rosbag2, use its folder with metadata.yaml")
-    recording = open_flight(flight, mapping)
+    recording = open_flight(flight, mapping, vehicle)
     if not recording.valid.any():
         raise ValueError(f"{flight}: no valid sample; check the --mapping")
     check_log(out)

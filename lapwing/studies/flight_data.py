@@ -162,6 +162,11 @@ class FlightData(FlightTracking):
         text = str(self.outcome) if len(self.truth) else "no ground truth"
         return f"<Flight of {self.metadata.get('scene', self.origin.source)}: {text}>"
 
+    @cached_property
+    def located(self) -> bool:
+        """True if the log has a position of the vehicle; an imported flight may have none."""
+        return bool(np.isfinite(self.truth.position).any())
+
     @property
     def energy(self) -> float:
         """Electrical energy consumed by the motors [J]."""

@@ -128,7 +128,7 @@ def write_usd(path, flight):
              "stateEstimate.qy", "stateEstimate.qz", "stateEstimate.vx", "stateEstimate.vy", "stateEstimate.vz",
              "gyro.x", "gyro.y", "gyro.z", "acc.x", "acc.y", "acc.z", "pm.vbat"]  # fmt: skip
     motors = [f"motor.m{k}" for k in (1, 2, 3, 4)]
-    out = b"\xbc" + struct.pack("<HHH", 2, 1, 7) + b"fixedFrequency\0" + struct.pack("<H", len(names) + 4)
+    out = bytearray(b"\xbc") + struct.pack("<HHH", 2, 1, 7) + b"fixedFrequency\0" + struct.pack("<H", len(names) + 4)
     out += b"".join(f"{n}(f)\0".encode() for n in names) + b"".join(f"{n}(H)\0".encode() for n in motors)
     for k in range(len(flight)):
         values = [*flight.position[k], *flight.attitude[k], *flight.velocity[k], *np.degrees(flight.omega[k]),
@@ -216,7 +216,7 @@ def write_ulog(path, flight):
     v = ned(flight)
     acceleration = np.gradient(v["velocity"], INTERVAL, axis=0)
     yaw = v["euler"][:, 2]
-    out = b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0)
+    out = bytearray(b"ULog\x01\x12\x35\x01" + struct.pack("<Q", 0))
     out += b"".join(message("F", f"{t}:uint64_t timestamp;{f}".encode()) for t, f in ULOG.items())
     out += b"".join(message("A", struct.pack("<BH", 0, k) + t.encode()) for k, t in enumerate(ULOG))
     for k in range(len(flight)):

@@ -545,7 +545,7 @@ def test_truncated_log_gives_report_too(log, tmp_path):
 def test_missing_data_is_reported(tmp_path):
     page = Page(report(record(tmp_path / "bare.mcap", messages(std=0.0, rotors=0, reference=False), {})))
     text = " ".join(page.texts)
-    assert set(page.plots) == {"mission_map", "timeline", "position", "attitude", "path", "air"}
+    assert set(page.plots) == {"mission_map", "timeline", "position", "turning", "attitude", "path", "air"}
     assert "Not shown: the vehicle has no motors." in text
     assert "Not shown: the estimate has no standard deviations (it is the truth)." in text
     assert "The log has no reference" in text

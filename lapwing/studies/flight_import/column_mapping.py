@@ -54,6 +54,7 @@ class Motors(_Table):
     unit: Literal["duty", "V"]
     full_scale: float = 1.0  # value of the columns at full duty, or at 1 V
     offset: float = 0.0  # value of the columns at zero duty
+    unused_below: float = 0.0  # duty that some motor falls below, unless the columns are in other units
 
 
 class Mapping(_Table):

@@ -91,6 +91,8 @@ def from_columns(path: Path, table: dict[str, np.ndarray], mapping: Mapping) -> 
     if "attitude" in measured:
         check_rate_unit(path, attitude_rate, omega, valid)
         notes.append(describe(attitude_rate, omega, valid, interval))
+    if duty.min() >= mapping.motors.unused_below > 0.0:
+        notes.append(f"motors never below {duty.min():.0%}: other units are suspected; see motorOutput in the header")
     voltage = duty
     if mapping.motors.unit == "duty":
         if np.isfinite(battery).all():

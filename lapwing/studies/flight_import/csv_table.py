@@ -9,6 +9,8 @@ from typing import TextIO, cast
 
 import numpy as np
 
+from lapwing.studies.flight_import.message_columns import NumberRows
+
 
 def read_columns(path: Path, selected: Collection[str]) -> dict[str, np.ndarray]:
     """Return those of the selected columns that a CSV file has, by name; empty fields are NaN.
@@ -53,7 +55,7 @@ def _read_tolerant(path: Path, indices: list[int]) -> np.ndarray:
         except ValueError:
             raise ValueError(f"{path}:{line}: {text[:20]!r} is not a number; expected numbers in every row") from None
 
-    rows = []
+    rows = NumberRows()
     with _open(path) as file:
         next(file)
         for line, row in enumerate(file, start=2):
@@ -63,4 +65,4 @@ def _read_tolerant(path: Path, indices: list[int]) -> np.ndarray:
                     raise ValueError(f"{path}:{line}: row is cut short; delete it, or record the flight again")
                 continue
             rows.append([number(line, fields[k]) for k in indices])
-    return np.array(rows).reshape(len(rows), len(indices))
+    return rows.to_array()

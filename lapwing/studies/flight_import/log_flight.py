@@ -42,7 +42,8 @@ def read_log_flight(path: Path) -> Recording:
     quaternion = unit(_sample(grid, times, continuous(truth.orientation[:, [3, 0, 1, 2]])))
     battery = np.full(len(grid), np.nan)
     position, velocity = _sample(grid, times, truth.position), _sample(grid, times, truth.velocity)
-    valid = np.isfinite(np.column_stack([position, velocity, quaternion, omega, volts])).all(axis=1)
+    measured = [v for v in (position, velocity, quaternion) if np.isfinite(v).any()]
+    valid = np.isfinite(np.column_stack([*measured, omega, volts])).all(axis=1)
     return Recording(
         path.stem, interval, position, quaternion, velocity, omega, force, volts, battery, valid,
         power=_power(grid, times, truth), setpoint=_setpoint(grid, flight), readings=_readings(flight, times[0]),

@@ -10,30 +10,33 @@ USD_MAPPING = "crazyflie_usd"
 FORMATS = ".ulg, .bin, .log, .tlog, .mcap, a rosbag2 folder, .csv and .csv.gz with --mapping, or a log of the Crazyflie"
 
 
-def open_flight(path: Path, mapping: str | None = None) -> Recording:
+def open_flight(path: Path, mapping: str | None = None, vehicle: str | None = None) -> Recording:
     """Read a flight, and note if it never leaves the ground. The file name's extension selects one of `FORMATS`.
 
     Args:
         path: path of the file, or of the folder of a rosbag2.
         mapping: name or file of the columns' mapping, for CSV files and logs of the Crazyflie.
+        vehicle: namespace of the vehicle in a rosbag2.
 
     Raises:
         ValueError: the format is unknown, a CSV file has no mapping, or the file is invalid.
     """
-    flight = _read(path, mapping)
+    flight = _read(path, mapping, vehicle)
     if reason := flight.grounded:
         note = f"never leaves the ground, {reason}: the flight cannot be validated"
         return replace(flight, notes=(*flight.notes, note))
     return flight
 
 
-def _read(path: Path, mapping: str | None) -> Recording:
+def _read(path: Path, mapping: str | None, vehicle: str | None) -> Recording:
     from lapwing.studies.flight_import import csv_flight, usd_log
 
     if path.is_dir():
         from lapwing.studies.flight_import.rosbag_flight import read_rosbag_flight
 
-        return read_rosbag_flight(path)
+        return read_rosbag_flight(path, vehicle)
+    if vehicle is not None:
+        raise ValueError(f"--vehicle {vehicle}: {path} is not a rosbag2 folder; omit the option")
     if not path.is_file():
         message = "is not a regular file" if path.exists() else "no such file"
         raise ValueError(f"{path}: {message}; use the path of a recorded flight")

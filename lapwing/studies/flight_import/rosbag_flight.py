@@ -1,7 +1,8 @@
 """Recordings from rosbag2 folders (SQLite or MCAP), read by rosbags.
 
 Messages are selected by type: those of ROS (ENU, FLU; REP 103), MAVROS, and PX4 (NED, FRD). Of several topics of one
-type, the one with most messages is used.
+type, the one with most messages is used. A bag with the motors of several vehicles needs the name of one: the first
+part of its topics.
 """
 
 from collections.abc import Callable
@@ -11,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from lapwing.studies.flight_import.channels import FLU, Channels, to_recording
+from lapwing.studies.flight_import.message_columns import NumberRows, RowLengthError
 from lapwing.studies.flight_import.recording import Recording, Series
 from lapwing.studies.flight_import.rotation_arrays import from_ned_frd, ned_to_enu, rotate, unit
 
@@ -51,16 +53,22 @@ FIELDS: dict[str, Callable[[Any], Any]] = {  # values of each message by type
     "px4_msgs/msg/BatteryStatus": lambda m: [m.voltage_v, m.current_a],
 }
 
+MOTORS = ("px4_msgs/msg/ActuatorMotors", "actuator_msgs/msg/Actuators", RC_OUT)
 POSES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped")
 
 
-def read_rosbag_flight(path: Path) -> Recording:
+def read_rosbag_flight(path: Path, vehicle: str | None = None) -> Recording:
     """Read a rosbag2 folder.
 
+    Args:
+        path: path of the folder.
+        vehicle: namespace of the vehicle, required if the bag has the motors of several.
+
     Raises:
-        ValueError: rosbags is not installed, the folder is not a rosbag2, or a required message is missing.
+        ValueError: rosbags is not installed, the folder is not a rosbag2, a required message is missing, or the
+            vehicle is ambiguous or unknown.
     """
-    series, unknown = _series(path)
+    series, unknown = _series(path, vehicle)
     channels = Channels(unknown=unknown)
 
     def part(name: str, columns: slice, change: Callable[[np.ndarray], np.ndarray] = np.asarray) -> Series | None:
@@ -80,7 +88,7 @@ def read_rosbag_flight(path: Path) -> Recording:
     channels.omega = part(f"{ros}Imu", slice(0, 3)) or part(imu, slice(0, 3), lambda v: v * FLU)
     channels.specific_force = part(f"{ros}Imu", slice(3, 6)) or part(imu, slice(3, 6), lambda v: v * FLU)
     channels.battery = part(f"{ros}BatteryState", slice(0, 2)) or part(f"{px4}BatteryStatus", slice(0, 2))
-    for name in (f"{px4}ActuatorMotors", "actuator_msgs/msg/Actuators", RC_OUT):
+    for name in MOTORS:
         if (source := series.get(name)) is not None:
             used = np.isfinite(source.values).any(axis=0)
             if name == RC_OUT:
@@ -103,18 +111,21 @@ def read_rosbag_flight(path: Path) -> Recording:
     return to_recording(path, channels, motors, "sensor_msgs/Imu, px4_msgs/SensorCombined")
 
 
-def _series(path: Path) -> tuple[dict[str, Series], tuple[str, ...]]:
+def _series(path: Path, vehicle: str | None) -> tuple[dict[str, Series], tuple[str, ...]]:
     """Return values by message type, and the topics without a counterpart."""
     try:
         from rosbags.highlevel import AnyReader
         from rosbags.typesys import Stores, get_typestore
     except ImportError:
         raise ValueError(f"{path}: a rosbag2 needs rosbags; install lapwing[rosbag]") from None
-    rows: dict[str, list[tuple[float, Any]]] = {}
+    rows: dict[str, NumberRows] = {}
     try:
         with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as bag:
             largest: dict[str, Any] = {}
+            inside = _prefix(path, [(c.topic, c.msgtype) for c in bag.connections], vehicle)
             for connection in bag.connections:
+                if not connection.topic.startswith(inside):
+                    continue
                 kind = connection.msgtype
                 if any(part in connection.topic.lower() for part in COMMANDS) and kind in POSES:
                     continue
@@ -124,15 +135,38 @@ def _series(path: Path) -> tuple[dict[str, Series], tuple[str, ...]]:
             for connection, received, raw in bag.messages(list(largest.values())):
                 message: Any = bag.deserialize(raw, connection.msgtype)
                 values = FIELDS[connection.msgtype](message)
-                rows.setdefault(connection.msgtype, []).append((_time(message, received), values))
+                rows.setdefault(connection.msgtype, NumberRows()).append((_time(message, received), *values))
+    except VehicleError:
+        raise
+    except RowLengthError:
+        raise ValueError(f"{path}: a topic's arrays change their length; record the flight again") from None
     except Exception:  # rosbags raises exceptions of many types
         raise ValueError(f"{path}: is not a readable rosbag2 folder; expected metadata.yaml and its messages") from None
-    try:
-        return {
-            k: Series.of([t for t, _ in r], [list(v) for _, v in r]) for k, r in rows.items() if len(r[0][1])
-        }, tuple(unknown)
-    except ValueError:
-        raise ValueError(f"{path}: a topic's arrays change their length; record the flight again") from None
+    tables = {kind: numbers.to_array() for kind, numbers in rows.items()}
+    return {kind: Series.of(table[:, 0], table[:, 1:]) for kind, table in tables.items() if table.shape[1] > 1}, tuple(
+        unknown
+    )
+
+
+class VehicleError(ValueError):
+    """Vehicle that is ambiguous or not in the bag."""
+
+
+def _prefix(path: Path, topics: list[tuple[str, str]], vehicle: str | None) -> str:
+    """Return the beginning of the vehicle's topics, given pairs (topic, type)."""
+    namespaces = sorted({topic.split("/")[1] for topic, kind in topics if kind in MOTORS})
+    several = any(
+        len({topic.split("/")[1] for topic, kind in topics if kind == one and topic.count("/") > 1}) > 1
+        for one in MOTORS
+    )
+    if vehicle is None and not several:
+        return "/"
+    if vehicle is None:
+        raise VehicleError(f"{path}: has several vehicles: {', '.join(namespaces)}; choose one with --vehicle")
+    if vehicle not in namespaces:
+        names = ", ".join(namespaces) or "none"
+        raise VehicleError(f"--vehicle {vehicle}: has no motor outputs in {path}; use one of {names}")
+    return f"/{vehicle}/"
 
 
 def _time(message: Any, received: int) -> float:

@@ -3,8 +3,6 @@
 Axes are NED and FRD. The time is that since boot, or the reception time of messages without it.
 """
 
-from collections import defaultdict
-from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +10,8 @@ import numpy as np
 
 from lapwing.studies.flight_import.channels import FLU, Channels, to_recording
 from lapwing.studies.flight_import.dataflash_flight import motor_outputs, pulse_range
-from lapwing.studies.flight_import.recording import Recording, Series, convert, longest_session, session_notes
+from lapwing.studies.flight_import.message_columns import Columns, MessageColumns
+from lapwing.studies.flight_import.recording import Recording, Series, convert, session_notes
 from lapwing.studies.flight_import.rotation_arrays import from_euler, from_ned_frd, ned_to_enu
 
 HIGHEST_SHARE = 2.0  # values of ACTUATOR_OUTPUT_STATUS above are pulses [us]
@@ -27,9 +26,19 @@ OTHER_VEHICLES = {  # MAV_TYPE
     12: "a submarine",
 }  # fmt: skip
 EPOCH = 1e15  # [us] above which a time stamp is Unix time
-USED = {
-    "ATTITUDE", "ATTITUDE_QUATERNION", "LOCAL_POSITION_NED", "HIGHRES_IMU", "SCALED_IMU", "SCALED_IMU2", "RAW_IMU",
-    "SERVO_OUTPUT_RAW", "ACTUATOR_OUTPUT_STATUS", "SYS_STATUS", "GPS_RAW_INT", "SCALED_PRESSURE", "DISTANCE_SENSOR",
+RATES, GYROSCOPE = ("rollspeed", "pitchspeed", "yawspeed"), ("xgyro", "ygyro", "zgyro")
+ACCELEROMETER, MAGNETOMETER = ("xacc", "yacc", "zacc"), ("xmag", "ymag", "zmag")
+PULSES = tuple(f"servo{n}_raw" for n in range(1, 17))
+TIMES = ("_timestamp", "time_boot_ms", "time_usec")  # reception [s], and two of the message
+USED = {  # fields of each message
+    "ATTITUDE": ("roll", "pitch", "yaw", *RATES),
+    "ATTITUDE_QUATERNION": ("q1", "q2", "q3", "q4", *RATES),
+    "LOCAL_POSITION_NED": ("x", "y", "z", "vx", "vy", "vz"),
+    "HIGHRES_IMU": (*GYROSCOPE, *ACCELEROMETER, *MAGNETOMETER, "abs_pressure"),
+    "SCALED_IMU": ACCELEROMETER, "RAW_IMU": ACCELEROMETER,
+    "SERVO_OUTPUT_RAW": PULSES, "ACTUATOR_OUTPUT_STATUS": ("active", "actuator"),
+    "SYS_STATUS": ("voltage_battery", "current_battery"),
+    "GPS_RAW_INT": ("lat", "lon", "alt"), "SCALED_PRESSURE": ("press_abs",), "DISTANCE_SENSOR": ("current_distance",),
 }  # fmt: skip
 
 
@@ -39,13 +48,13 @@ def read_tlog_flight(path: Path) -> Recording:
     Raises:
         ValueError: the file is not a telemetry log, or a required message is missing.
     """
-    messages, parameters, unknown, notes = _messages(path)
+    messages, boot, parameters, unknown, notes = _messages(path)
     channels = Channels(unknown=tuple(sorted(unknown)), notes=notes)
 
     def series(name: str, *fields: str, scale: float = 1.0) -> Series | None:
-        if (rows := messages.get(name)) is None:
+        if (table := messages.get(name)) is None:
             return None
-        return Series.of([t for t, _ in rows], [[scale * getattr(m, f) for f in fields] for _, m in rows])
+        return Series.of(_time(name, table, boot), scale * table.stack(*fields))
 
     channels.attitude = convert(series("ATTITUDE_QUATERNION", "q1", "q2", "q3", "q4"), from_ned_frd)
     if channels.attitude is None:
@@ -53,31 +62,28 @@ def read_tlog_flight(path: Path) -> Recording:
         channels.attitude = convert(euler, lambda v: from_ned_frd(from_euler(v)))
     channels.position = convert(series("LOCAL_POSITION_NED", "x", "y", "z"), ned_to_enu)
     channels.velocity = convert(series("LOCAL_POSITION_NED", "vx", "vy", "vz"), ned_to_enu)
-    rates = ("rollspeed", "pitchspeed", "yawspeed")
-    omega = (
-        series("HIGHRES_IMU", "xgyro", "ygyro", "zgyro")
-        or series("ATTITUDE_QUATERNION", *rates)
-        or series("ATTITUDE", *rates)
-    )
+    omega = series("HIGHRES_IMU", *GYROSCOPE) or series("ATTITUDE_QUATERNION", *RATES) or series("ATTITUDE", *RATES)
     channels.omega = convert(omega, lambda v: v * FLU)
     milli_g = 1e-3 * STANDARD_GRAVITY
-    force = series("HIGHRES_IMU", "xacc", "yacc", "zacc") or series("SCALED_IMU", "xacc", "yacc", "zacc", scale=milli_g)
-    channels.specific_force = convert(
-        force or series("RAW_IMU", "xacc", "yacc", "zacc", scale=milli_g), lambda v: v * FLU
+    force = (
+        series("HIGHRES_IMU", *ACCELEROMETER)
+        or series("SCALED_IMU", *ACCELEROMETER, scale=milli_g)
+        or series("RAW_IMU", *ACCELEROMETER, scale=milli_g)
     )
+    channels.specific_force = convert(force, lambda v: v * FLU)
     battery = series("SYS_STATUS", "voltage_battery", "current_battery")
     channels.battery = convert(battery, _volts_and_amperes)
-    channels.duty = _duty(messages, parameters, channels)
-    raw = ("xgyro", "ygyro", "zgyro", "xacc", "yacc", "zacc")
+    channels.duty = _duty(messages, boot, parameters, channels)
     readings = {
-        "imu": convert(series("HIGHRES_IMU", *raw), lambda v: v * np.tile(FLU, 2)),
+        "imu": convert(series("HIGHRES_IMU", *GYROSCOPE, *ACCELEROMETER), lambda v: v * np.tile(FLU, 2)),
         "gps": convert(series("GPS_RAW_INT", "lat", "lon", "alt"), lambda v: v * [1e-7, 1e-7, 1e-3]),
         "baro": series("SCALED_PRESSURE", "press_abs", scale=100.0)
         or series("HIGHRES_IMU", "abs_pressure", scale=100.0),
-        "mag": convert(series("HIGHRES_IMU", "xmag", "ymag", "zmag", scale=1e-4), lambda v: v * FLU),
+        "mag": convert(series("HIGHRES_IMU", *MAGNETOMETER, scale=1e-4), lambda v: v * FLU),
         "rangefinder": series("DISTANCE_SENSOR", "current_distance", scale=1e-2),
     }
     channels.readings = {name: s for name, s in readings.items() if s is not None}
+    messages.clear()  # the series are copies
     return to_recording(path, channels, "SERVO_OUTPUT_RAW, ACTUATOR_OUTPUT_STATUS", "HIGHRES_IMU, ATTITUDE")
 
 
@@ -87,44 +93,42 @@ def _volts_and_amperes(raw: np.ndarray) -> np.ndarray:
     return np.where(unknown, np.nan, raw * [1e-3, 1e-2])
 
 
-def _messages(path: Path) -> tuple[dict[str, list[tuple[float, Any]]], dict[str, float], set[str], list[str]]:
-    """Return (time [s] since boot, message) of one autopilot by name, parameters, other messages' names, and notes."""
+def _messages(path: Path) -> tuple[dict[str, Columns], float, dict[str, float], set[str], list[str]]:
+    """Return messages of one autopilot by name, reception time of its boot [s], parameters, other names, and notes."""
     from pymavlink import mavutil
 
-    rows: list[tuple[float, Any]] = []
+    fields = {name: (*TIMES, *others) for name, others in USED.items()}
+    systems: dict[int, MessageColumns] = {}
     parameters: dict[str, float] = {}
     unknown: set[str] = set()
     system = None
     try:
         log = mavutil.mavlogfile(str(path))  # mavlink_connection would scan the file first, and fail on a damaged one
         while (message := log.recv_msg()) is not None:
-            name = message.get_type()
+            name, sender = message.get_type(), message.get_srcSystem()
             if name == "HEARTBEAT" and system is None and message.autopilot != NO_AUTOPILOT:
-                system = message.get_srcSystem()
+                system = sender
                 if vehicle := OTHER_VEHICLES.get(message.type):
                     raise ValueError(f"{path}: is the log of {vehicle}; expected a multirotor's log")
-            if name == "PARAM_VALUE" and message.get_srcComponent() == 1 and message.get_srcSystem() == system:
+            if name == "PARAM_VALUE" and message.get_srcComponent() == 1 and sender == system:
                 parameters[str(message.param_id)] = float(message.param_value)
             if name == "BAD_DATA":
                 continue
             if name not in USED:
                 unknown.add(name)
-            elif message.get_srcComponent() == 1 and _is_first_instance(name, message):
-                rows.append((message._timestamp, message))
+            elif message.get_srcComponent() == 1 and _is_first_instance(name, message) and system in (None, sender):
+                clock = getattr(message, "time_boot_ms", np.nan) * 1e-3
+                systems.setdefault(sender, MessageColumns(fields)).add(message, clock)
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
-    if system is not None:
-        rows = [row for row in rows if row[1].get_srcSystem() == system]
-    if not rows:
+    messages = systems.get(next(iter(systems), None) if system is None else system)
+    if messages is None:
         raise ValueError(f"{path}: has no messages of an autopilot; expected a telemetry log (.tlog)")
-    since_boot = np.array([getattr(m, "time_boot_ms", np.nan) * 1e-3 for _, m in rows])
-    used, sessions = longest_session(since_boot)
-    boot_times = np.array([t for t, _ in rows])[used] - since_boot[used]
-    boot = float(np.nanmedian(boot_times)) if np.isfinite(boot_times).any() else 0.0
-    result: dict[str, list[tuple[float, Any]]] = defaultdict(list)
-    for received, message in compress(rows, used):
-        result[message.get_type()].append((_time(received - boot, message), message))
-    return result, parameters, unknown, session_notes(sessions)
+    columns, sessions = messages.longest_session()
+    boots = [table.get("_timestamp", np.nan) - 1e-3 * table.get("time_boot_ms", np.nan) for table in columns.values()]
+    known = np.concatenate(boots)
+    boot = float(np.nanmedian(known)) if np.isfinite(known).any() else 0.0
+    return columns, boot, parameters, unknown, session_notes(sessions)
 
 
 def _is_first_instance(name: str, message: Any) -> bool:
@@ -136,29 +140,28 @@ def _is_first_instance(name: str, message: Any) -> bool:
     return all(getattr(message, field) == 0 for field in ("id", "port") if field in message.fieldnames)
 
 
-def _time(received: float, message: Any) -> float:
-    """Return the time since boot [s] from the message, or its reception time."""
-    if hasattr(message, "time_boot_ms"):
-        return float(message.time_boot_ms) * 1e-3
-    stamp = getattr(message, "time_usec", 0)
-    if message.get_type() == "SERVO_OUTPUT_RAW" and stamp > 0 and received * 1e6 < EPOCH:
-        stamp += WRAP * round((received * 1e6 - stamp) / WRAP)
-    return float(stamp) * 1e-6 if 0 < stamp < EPOCH else received
+def _time(name: str, table: Columns, boot: float) -> np.ndarray:
+    """Return the times since boot [s] from the messages, or their reception times, shape (n,)."""
+    if "time_boot_ms" in table:
+        return table.get("time_boot_ms", np.nan) * 1e-3
+    received = table.get("_timestamp", np.nan) - boot
+    stamp = table.get("time_usec", 0.0)
+    if name == "SERVO_OUTPUT_RAW":
+        wraps = np.round((received * 1e6 - stamp) / WRAP)
+        stamp = stamp + np.where((stamp > 0.0) & (received * 1e6 < EPOCH), WRAP * wraps, 0.0)
+    return np.where((stamp > 0.0) & (stamp < EPOCH), stamp * 1e-6, received)
 
 
-def _duty(
-    messages: dict[str, list[tuple[float, Any]]], parameters: dict[str, float], channels: Channels
-) -> Series | None:
+def _duty(messages: dict[str, Columns], boot: float, parameters: dict[str, float], channels: Channels) -> Series | None:
     """Return the shares of full throttle of the outputs that ArduPilot's parameters name, or of those that change."""
     name = "ACTUATOR_OUTPUT_STATUS" if "ACTUATOR_OUTPUT_STATUS" in messages else "SERVO_OUTPUT_RAW"
-    if name not in messages:
+    if (table := messages.get(name)) is None:
         return None
-    rows = messages[name]
     if name == "SERVO_OUTPUT_RAW":
-        values = np.array([[getattr(m, f"servo{n}_raw", 0) for n in range(1, 17)] for _, m in rows], float)
+        values = table.stack(*(pulse for pulse in PULSES if pulse in table))
     else:
-        active = max(m.active.bit_length() for _, m in rows)
-        values = np.array([list(m.actuator)[:active] for _, m in rows], float)
+        active = int(table.get("active", 0.0).max()).bit_length()
+        values = table.stack("actuator")[:, :active]
     used = np.array(motor_outputs(parameters), int) - 1
     if not len(used) or used.max() >= values.shape[1]:
         used = np.flatnonzero(np.ptp(values, axis=0) > 0.0)
@@ -168,4 +171,4 @@ def _duty(
     if name == "SERVO_OUTPUT_RAW" or np.nanmax(values) > HIGHEST_SHARE:
         low, high = pulse_range(parameters)
         values = (values - low) / (high - low)
-    return Series.of([t for t, _ in rows], values[:, used])
+    return Series.of(_time(name, table, boot), values[:, used])

@@ -55,6 +55,10 @@ VEHICLE = "drone1"
 FRAME = "world"
 BATTERY_INTERVAL = 0.1  # [s]
 UNSET = Vector3(math.nan, math.nan, math.nan)
+UNKNOWN_BATTERY = BatteryState(
+    temperature=math.nan, charge=math.nan, capacity=math.nan, design_capacity=math.nan, percentage=math.nan,
+    present=True,
+)  # fmt: skip
 MODES = {  # vehicle_status.nav_state of PX4
     0: "manual", 1: "altitude", 2: "position", 3: "mission", 4: "hold", 5: "return", 10: "acro", 12: "descend",
     13: "terminated", 14: "offboard", 15: "stabilized", 17: "takeoff", 18: "land", 19: "follow", 20: "precision land",
@@ -128,7 +132,9 @@ def _motion(flight: Recording) -> Iterator[tuple[int, Topic, Any]]:
     """Yield (time [ns], topic, message) of the quantities on the flight's grid."""
     acceleration = np.gradient(flight.velocity, flight.interval, axis=0)
     highest = max(float(np.nanmax(flight.motor_voltage, initial=0.0)), 1e-9)
-    located = np.isfinite(np.column_stack([flight.position, flight.attitude])).all(axis=1)
+    measured = [values for values in (flight.position, flight.attitude) if np.isfinite(values).any()]
+    known = np.isfinite(np.column_stack([flight.omega, *measured])).all(axis=1)
+    current = -flight.power / flight.battery_voltage if len(flight.power) else np.full(len(flight), np.nan)
     desired = bool(np.isfinite(flight.setpoint[:, :3]).any())
     battery_ticks = max(round(BATTERY_INTERVAL / flight.interval), 1)
     for k in range(len(flight)):
@@ -136,7 +142,7 @@ def _motion(flight: Recording) -> Iterator[tuple[int, Topic, Any]]:
         header = _header(time_ns)
         volts = tuple(flight.motor_voltage[k].tolist())
         if flight.valid[k]:
-            if located[k]:
+            if known[k]:  # quantities of which the flight has no sample are NaN
                 pose = Pose(Point(*flight.position[k].tolist()), _quaternion(flight.attitude[k]))
                 motion = VehicleState(
                     header=header, pose=pose, velocity=_vector(flight.velocity[k]),
@@ -153,7 +159,9 @@ def _motion(flight: Recording) -> Iterator[tuple[int, Topic, Any]]:
             if desired:
                 yield time_ns, SETPOINT, _setpoint(header, flight.setpoint[k].tolist())
         if k % battery_ticks == 0 and math.isfinite(flight.battery_voltage[k]):
-            battery = BatteryState(header=header, voltage=float(flight.battery_voltage[k]), present=True)
+            battery = UNKNOWN_BATTERY._replace(
+                header=header, voltage=float(flight.battery_voltage[k]), current=float(current[k])
+            )
             yield time_ns, BATTERY, battery
 
 

@@ -35,7 +35,7 @@ def moments(residual: np.ndarray, derivatives: np.ndarray, instruments: np.ndarr
 
     Standard errors come from the sandwich estimator over clusters, with the small-sample factor n / (n - k) of the
     variance for n clusters. They are scaled so that two of them cover as much of Student's distribution as of a
-    normal one.
+    normal one; with a single cluster they are infinite.
 
     Args:
         residual: shape (m,).
@@ -60,7 +60,8 @@ def moments(residual: np.ndarray, derivatives: np.ndarray, instruments: np.ndarr
     covariance = inverse @ (centred.T @ centred * factor) @ inverse.T
     spread = np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     correlation = np.where(dead | dead[:, None], np.eye(k), covariance / np.outer(spread, spread))
-    deviation = np.where(dead, np.inf, spread * student.ppf(norm.cdf(2.0), max(len(total) - k, 1)) / 2.0)
+    unknown = dead | (len(total) == 1)  # one cluster has no spread
+    deviation = np.where(unknown, np.inf, spread * student.ppf(norm.cdf(2.0), max(len(total) - k, 1)) / 2.0)
     known = np.where(values > SINGULAR, 1.0 / np.maximum(values, SINGULAR), 0.0)
     step = -((right.T * known) @ left.T / np.outer(scale, scale)) @ total.sum(axis=0)
     return Moments(np.clip(step, -deviation, deviation), deviation, correlation)

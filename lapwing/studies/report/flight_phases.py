@@ -15,6 +15,14 @@ def over(flight: FlightData) -> dict:
     return {"span": (float(t[0]), float(max(t[-1], t[0] + 1e-9))), "phases": tuple(phases(flight))}
 
 
+def check_measured(name: str, values: np.ndarray) -> None:
+    """Raise NotRecordedError for a quantity that is constant, or not finite anywhere; shape (n, k)."""
+    if not np.isfinite(values).any():
+        raise NotRecordedError(f"{name} is not measured")
+    if len(values) > 1 and not np.ptp(values, axis=0).any():
+        raise NotRecordedError(f"{name} is constant")
+
+
 def phases(flight: FlightData) -> list[tuple[str, float, float]]:
     """Return the name, start and end [s] of each phase of the mission, in order; empty without setpoints."""
     if not flight.has("setpoint"):
@@ -41,10 +49,9 @@ def three_axes(flight: FlightData, first: int, actual: np.ndarray, unit: str, sc
         caption: caption of the plot.
 
     Raises:
-        NotRecordedError: the values are constant.
+        NotRecordedError: the values are constant or not measured.
     """
-    if len(actual) > 1 and not np.ptp(actual, axis=0).any():
-        raise NotRecordedError("it is constant")
+    check_measured("it", actual)
     t, n, panels = flight.truth.times, len(flight.reference), []
     has_errors = bool(flight.armed.any())
     for row, name in enumerate(AXES[first : first + 3]):

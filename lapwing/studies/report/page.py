@@ -82,6 +82,8 @@ def _view3d_hint(flights: Sequence[FlightData]) -> str:
     """Return the command that shows the 3D view, or the reason why it is unavailable."""
     from lapwing.studies.view3d import MISSING, available
 
+    if not all(flight.located for flight in flights):
+        return "the position is not measured"
     source = flights[0].origin.source if flights[0].origin.recorded else "LOG"
     return f"lapwing view {source}" if available() else MISSING
 

@@ -27,7 +27,10 @@ def write(flights: FlightData | Sequence[FlightData], target: Path, view3d: bool
             from lapwing.studies.report.page import flight_page
             from lapwing.studies.view3d import available
 
-            target.write_text(flight_page(flight_list, view3d and available()), encoding="utf-8")
+            target.write_text(
+                flight_page(flight_list, view3d and available() and all(flight.located for flight in flight_list)),
+                encoding="utf-8",
+            )
         else:
             from lapwing.studies.report.sections import sections
 

@@ -31,9 +31,12 @@ def page(flights: Sequence[FlightData], names: Sequence[str], times: np.ndarray 
         times: times of the frames [s], shape (k,), ascending; None: `RATE` frames per second of the entire flights.
 
     Raises:
-        ValueError: viser is not installed.
+        ValueError: viser is not installed, or a flight has no position.
     """
     require()
+    for flight in flights:
+        if not flight.located:
+            raise ValueError(f"{flight.origin.source}: the position is not measured, no 3D view; use lapwing report")
     compared = len(flights) > 1
     shown = list(flights) if compared else [flights[0], *flights[0].others]
     titles = list(names) if compared else [flight.vehicle for flight in shown]

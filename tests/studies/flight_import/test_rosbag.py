@@ -1,5 +1,7 @@
 """Imports of rosbag2 folders with setpoints, pulses of motors, and no throttles."""
 
+import subprocess
+import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -70,3 +72,36 @@ def test_bag_without_throttles_has_no_motor_outputs(tmp_path):
     write_bag(tmp_path / "bag", {**BAG, "/motors": ("actuator_msgs/msg/Actuators", 1, no_shares)})
     with pytest.raises(ValueError, match="no motor outputs"):
         open_flight(tmp_path / "bag")
+
+
+FLEET = {
+    f"/{name}{topic}": (kind, 1, content)
+    for name, height in (("red", 2.0), ("blue", 5.0))
+    for topic, kind, content in (
+        ("/pose", "geometry_msgs/msg/PoseStamped", pose(height)),
+        ("/imu", "sensor_msgs/msg/Imu", imu),
+        ("/rc/out", "mavros_msgs/msg/RCOut", pulses),
+    )
+}
+
+
+def test_bag_of_several_vehicles_needs_a_name(tmp_path):
+    write_bag(tmp_path / "bag", FLEET)
+    with pytest.raises(ValueError, match=r"several vehicles: blue, red; choose one with --vehicle"):
+        open_flight(tmp_path / "bag")
+    with pytest.raises(ValueError, match=r"--vehicle green: .*use one of blue, red"):
+        open_flight(tmp_path / "bag", vehicle="green")
+    result = open_flight(tmp_path / "bag", vehicle="blue")
+    assert result.position[:, 2] == pytest.approx(5.0)
+    assert "/red/imu" in result.unknown
+
+
+@pytest.mark.long
+def test_command_selects_vehicle_of_bag(tmp_path):
+    write_bag(tmp_path / "bag", FLEET)
+    command = [sys.executable, "-m", "lapwing", "import", tmp_path / "bag", "--out", tmp_path / "f.mcap"]
+    done = subprocess.run([*command, "--vehicle", "red"], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    assert open_flight(tmp_path / "f.mcap").position[:, 2] == pytest.approx(2.0)
+    refused = subprocess.run(command, capture_output=True, text=True)
+    assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)

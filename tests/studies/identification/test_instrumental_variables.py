@@ -44,3 +44,8 @@ def test_parameter_without_influence_has_infinite_error_and_no_step():
     assert result.deviation[1] == np.inf
     assert result.step[1] == 0.0
     assert result.correlation[0, 1] == 0.0
+
+
+def test_single_cluster_has_no_finite_standard_errors():
+    first, second, y = regression(1)
+    assert np.isinf(moments(first @ TRUE - y, first, second, 0 * NAMES).deviation).all()

@@ -6,8 +6,9 @@ import numpy as np
 
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.plan_shapes import fence_shapes, waypoints
+from lapwing.studies.report.flight_phases import check_measured
 from lapwing.studies.report.key_numbers import trouble
-from lapwing.studies.report.plot import Line, NotRecordedError, Panel, Plot, reference
+from lapwing.studies.report.plot import Line, Panel, Plot, reference
 from lapwing.studies.report.style import AXIS_COLOURS, BOUND, COLOURS, FLOWN, QUIET
 
 ORDER = -10
@@ -22,8 +23,7 @@ LEAST = 2.0  # [m] minimum extent of the map, so that a hover does not show nois
 def draw(flight: FlightData) -> Plot:
     """Plot the plan view, north up."""
     x, y, _ = flight.truth.position.T
-    if len(flight.truth) > 1 and not np.ptp(flight.truth.position, axis=0).any():
-        raise NotRecordedError("the position is constant")
+    check_measured("the position", flight.truth.position)
     name, colour = "flown", FLOWN
     if len(flight.fleet) > 1:
         name, colour = flight.vehicle, COLOURS[list(flight.fleet).index(flight.vehicle) % len(COLOURS)]

@@ -19,15 +19,19 @@ RPM = 60.0 / (2.0 * np.pi)  # [rpm] in 1 rad/s
 def draw(flight: FlightData) -> Plot:
     """Plot each quantity in a panel, with a line for each motor."""
     truth, t = flight.truth, flight.truth.times
-    if truth.rotor_speed.shape[-1] == 0:
+    if truth.motor_voltage.shape[-1] == 0:
         raise NotRecordedError("the vehicle has no motors")
+    marks, note = limits(flight)
+    if truth.rotor_speed.shape[-1] == 0:  # an imported flight
+        label = "voltage [V]" if flight.has("battery") else "throttle [1]"
+        panel = Panel(motors(t, truth.motor_voltage), label)
+        return Plot(caption="Commands of the motors. " + note, **column([panel], 3.0, **over(flight)))
     quantities = (
         ("propeller speed [rpm]", truth.rotor_speed * RPM),
         ("voltage [V]", truth.motor_voltage),
         ("electrical power [W]", truth.motor_power),
     )
     panels = [Panel(motors(t, values), label) for label, values in quantities]
-    marks, note = limits(flight)
     panels[1] = panels[1]._replace(marks=panels[1].marks + marks)
     energy = float(np.sum(np.diff(t) * truth.motor_power.sum(axis=1)[:-1])) / WATT_HOUR
     caption = f"Speed of each propeller, voltage and power of its motor. All motors consume {energy:.1f} W h. "

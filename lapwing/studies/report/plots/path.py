@@ -1,9 +1,8 @@
 """Path from two sides; the mission map shows it from above."""
 
-import numpy as np
-
 from lapwing.studies.flight_data import FlightData
-from lapwing.studies.report.plot import Line, NotRecordedError, Panel, Plot, reference
+from lapwing.studies.report.flight_phases import check_measured
+from lapwing.studies.report.plot import Line, Panel, Plot, reference
 
 ORDER = 40
 TITLE = "Path from the side"
@@ -12,8 +11,7 @@ NEEDS = ("ground_truth",)
 
 def draw(flight: FlightData) -> Plot:
     """Plot the views from the south and from the east."""
-    if len(flight.truth) > 1 and not np.ptp(flight.truth.position, axis=0).any():
-        raise NotRecordedError("the position is constant")
+    check_measured("the position", flight.truth.position)
     reference_text = " and its reference" if len(flight.reference) else ""
     caption = f"Path{reference_text} from the south (left) and from the east (right)."
     return Plot(tuple(side(flight, axis)._replace(column=axis) for axis in (0, 1)), caption, 3.6, (1.0,), (1.0, 1.0))
