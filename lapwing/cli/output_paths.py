@@ -170,7 +170,10 @@ def _write_errors(path: Path) -> Iterator[None]:
     except FileExistsError:
         raise
     except OSError as error:
-        raise ValueError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from None
+        reason = (error.strerror or str(error)).lower()
+        if not path.parent.exists():
+            reason = f"there is no folder {path.parent}; create it"
+        raise ValueError(f"{path}: cannot be written: {reason}") from None
 
 
 def _has_messages(log: Path) -> bool:
