@@ -95,7 +95,7 @@ BAD = {
     ),
     "keys": ([HOVER, "--keys", "x"], "--keys: expected with --listen or --endpoints"),
     "door": ([HOVER, "--listen", "x"], "--listen x: expected an endpoint protocol/address:port"),
-    "option": ([HOVER, "--lgo", "x"], "No such option: --lgo"),
+    "option": ([HOVER, "--lgo", "x"], "(see lapwing run --help)"),
     "no scene": ([], "Missing argument 'SCENE'"),
 }
 
