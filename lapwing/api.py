@@ -66,6 +66,7 @@ def fly(
         SceneError: the scene is invalid, or the controller does not fit it; names the key and the fault.
     """
     user_code = {"controller": (controller, controller_options), "estimator": (estimator, estimator_options)}
+    base = with_solver(scene_resolver.load_one(scene, overrides))
     folder = Path(scene.path if isinstance(scene, Scene) else scene).parent
     with ExitStack() as stack:
         own: dict[str, Any] = {} if seed is None else {"run.seed": seed}
@@ -74,7 +75,6 @@ def fly(
                 own[f"autopilot.{key}"] = stack.enter_context(register(code, folder))
             if options:
                 own[f"autopilot.{key}_options"] = dict(options)
-        base = with_solver(scene_resolver.load_one(scene, overrides))
         return _fly_with_bar(resolve(load_scene(base, own)))
 
 
@@ -118,6 +118,8 @@ def campaign(
     for key, distribution in (vary or {}).items():
         if not isinstance(distribution, Distribution):
             raise SceneError(key, f"got {distribution!r}", "a distribution, for example lapwing.normal(10.4, 0.2)")
+    if not isinstance(seeds, Iterable):
+        raise SceneError("seeds", f"got {seeds!r}", "several whole numbers, for example range(1, 101)")
     seeds = list(seeds)
     if not seeds:
         raise SceneError("seeds", "got none", "at least one")

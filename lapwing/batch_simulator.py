@@ -81,8 +81,8 @@ class BatchSimulator:
             ValueError: n is below 1, or the members differ in their effects, solvers, or tables of numbers, such as the
                 heights of a terrain.
         """
-        if n < 1:
-            raise ValueError(f"n: expected at least 1 member, got {n}")
+        if not hasattr(n, "__index__") or n < 1:
+            raise ValueError(f"n: expected a whole number of members, at least 1, got {n!r}")
         base = with_solver(load_one(scene, overrides))
         batch_plan = plan(base.name, (), n, seed, vary)
         first = batch_members.plant_of(load(base, batch_plan.overrides_of(0)))
@@ -207,7 +207,7 @@ class BatchSimulator:
         for name, part in zip(Motion._fields, self._like.motion, strict=True):
             if name in state:
                 shape, start = (len(selected), len(part)), state.pop(name)
-                start = np.broadcast_to(start, shape) if np.ndim(start) == 1 else start
+                start = np.broadcast_to(start, shape) if np.shape(start) == shape[1:] else start
                 value = batch_members.finite_array(name, start, shape)
                 for k in range(len(part)):
                     self._blocks[selected // simd_batch.WIDTH, column + k, selected % simd_batch.WIDTH] = value[:, k]

@@ -113,7 +113,7 @@ class Flight(FlightData):
             ValueError: the file cannot be written, or has another extension.
         """
         source = Path(self.origin.source)
-        flights = [self] if compare_with is None else [self, compare_with]
+        flights = self._with(compare_with)
         return write(flights, Path(path) if path else source.with_suffix(".html"), view3d)
 
     def view(self, compare_with: FlightData | None = None, height: int = 480) -> View:
@@ -129,8 +129,14 @@ class Flight(FlightData):
         from lapwing.studies.report.sections import labels
         from lapwing.studies.view3d.recording import page
 
-        flights = [self] if compare_with is None else [self, compare_with]
+        flights = self._with(compare_with)
         return View(page(flights, labels(flights)), height)
+
+    def _with(self, other: studied.FlightData | None) -> list[studied.FlightData]:
+        """Return this flight and the other one. Raise ValueError if the other one is not a flight."""
+        if other is not None and not isinstance(other, studied.FlightData):
+            raise ValueError(f"compare_with: expected a flight, for example lapwing.read_log(path), got {other!r}")
+        return [self] if other is None else [self, other]
 
     def plot(self, path: str | Path | None = None) -> "Figure":
         """Plot displacements and references over time, and the path in space.

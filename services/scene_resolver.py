@@ -81,6 +81,8 @@ def load(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
     """
     if isinstance(scene, Scene):
         return scenes.with_overrides(scene, overrides, vocabulary()) if overrides else scene
+    if not isinstance(scene, str | Path):
+        raise SceneError("scene", f"got {scene!r}", "a name, a path, or a loaded scene")
     if Path(scene).suffix == ".ssp":
         return _load_package(Path(scene), overrides)
     return scenes.load(scene, overrides, vocabulary(), run_schema.SHIPPED)

@@ -119,6 +119,8 @@ def export(
     claim(mat)
     with LogReader(log) as read:
         result = tables.tables(read, topics.split(",") if topics is not None else None)
+        if not read.complete:
+            typer.echo(f"{log}: the log is incomplete: its end is missing, see lapwing info", err=True)
     for folder, write in ((parquet, tables.write_parquet), (csv, tables.write_csv), (mat, tables.write_mat)):
         if folder is None:
             continue
@@ -152,7 +154,7 @@ def _about(info: "Info") -> dict[str, str]:
         "recovered": metadata.get("recovered", ""),
         "end": "" if info.complete else "none, the recorder was ended; use lapwing recover",
     }
-    lines |= {f"no {command}": f"lacks {needed}" for command, needed in info.missing.items()}
+    lines |= {command: f"not possible: the log lacks {needed}" for command, needed in info.missing.items()}
     return {label: line for label, line in lines.items() if line}
 
 

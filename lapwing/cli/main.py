@@ -92,9 +92,10 @@ def main() -> None:
         relax_gc()
         try:
             with foreign_code.permission(False):
-                app(sys.argv[1:] or ["--help"], standalone_mode=False)
+                app(sys.argv[1:] or ["--help"], prog_name="lapwing", standalone_mode=False)
         except UsageError as error:
-            fail(f"{error.format_message()} (see lapwing --help)", USER_ERROR)
+            command = error.ctx.command_path if error.ctx else "lapwing"
+            fail(f"{error.format_message()} (see {command} --help)", USER_ERROR)
 
 
 if __name__ == "__main__":

@@ -16,7 +16,9 @@ def write_errors(path: str | Path) -> Iterator[None]:
     try:
         yield
     except OSError as error:
-        raise ValueError(f"{path}: cannot be written: {(error.strerror or str(error)).lower()}") from None
+        folder = Path(path).parent
+        reason = (error.strerror or str(error)).lower() if folder.exists() else f"there is no folder {folder}; create it"
+        raise ValueError(f"{path}: cannot be written: {reason}") from None
 
 
 class OutputLock:

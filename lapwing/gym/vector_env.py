@@ -93,7 +93,10 @@ class DroneVectorEnv(VectorEnv):
             ValueError: actions of another shape, or not finite.
         """
         n, batch, episodes = self.num_envs, self.batch, self._episodes
-        numbers = np.asarray(actions, float).reshape(n, 4)
+        numbers = np.asarray(actions, float)
+        if numbers.size != 4 * n:
+            raise ValueError(f"actions: expected 4 numbers for each vehicle, shape ({n}, 4), got {numbers.shape}")
+        numbers = numbers.reshape(n, 4)
         if not step_kernels.read_actions(numbers, self._weight, batch.setpoints):
             raise ValueError("actions: expected finite numbers")
         shape = (n, len(BOUNDS))

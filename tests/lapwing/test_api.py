@@ -147,6 +147,11 @@ def test_campaign_varies_loaded_scene_by_seed_and_run():
         (lambda: lapwing.campaign("hover", [1], {"vehicle.mass": 10.4}), "vehicle.mass: expected a distribution"),
         (lambda: lapwing.campaign("hover", [1], {"vehicle.mas": lapwing.normal(1.0, 0.0)}), "did you mean mass?"),
         (lambda: lapwing.campaign("hover", []), "seeds: expected at least one, got none"),
+        (
+            lambda: lapwing.campaign("hover", 5),
+            "seeds: expected several whole numbers, for example range(1, 101), got 5",
+        ),
+        (lambda: lapwing.fly(None), "scene: expected a name, a path, or a loaded scene, got None"),
         (lambda: lapwing.fly("hover", seed=-1), "run.seed: expected a whole number at least 0"),
         (lambda: lapwing.fly("hoverr"), "unknown scene 'hoverr'; did you mean hover?"),
         (lambda: lapwing.load_scene("hover", "run.seed=1"), "a list: [\"KEY=VALUE\"], got 'run.seed=1'"),
@@ -172,5 +177,8 @@ def test_plot_is_figure_and_file(tmp_path):
     figure = flight.plot(tmp_path / "flight.png")
     assert len(figure.axes) == 4
     assert (tmp_path / "flight.png").stat().st_size > 10_000
-    with pytest.raises(ValueError, match=r"none/flight.png: cannot be written: no such file"):
+    for compare in (flight.report, flight.view):
+        with pytest.raises(ValueError, match=r"compare_with: expected a flight, .*, got 'second.mcap'"):
+            compare(compare_with="second.mcap")
+    with pytest.raises(ValueError, match=r"none/flight.png: cannot be written: there is no folder"):
         flight.plot(tmp_path / "none" / "flight.png")

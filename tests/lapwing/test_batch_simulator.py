@@ -166,7 +166,8 @@ def test_elements_that_fill_last_block_repeat_last_member():
 @pytest.mark.parametrize(
     ("wrong", "text"),
     [
-        (lambda b: lapwing.BatchSimulator("hover", 0), "n: expected at least 1 member, got 0"),
+        (lambda b: lapwing.BatchSimulator("hover", 0), "n: expected a whole number of members, at least 1, got 0"),
+        (lambda b: lapwing.BatchSimulator("hover", "many"), "n: expected a whole number of members, .* got 'many'"),
         (
             lambda b: lapwing.BatchSimulator("gyrostat_chaotic", 2),
             'expected "rigid_body", the only one that batches step',
@@ -184,6 +185,7 @@ def test_elements_that_fill_last_block_repeat_last_member():
         (lambda b: b.reset(attitude=(0.0, 0.0, 0.0, 0.0)), "attitude: expected unit quaternions"),
         (lambda b: b.reset(position_world=(0.0, 0.0, -5.0)), "position_world: expected a centre of mass above the"),
         (lambda b: b.reset(rotor_speed=np.full(4, -300.0)), "rotor_speed: expected speeds of at least 0 rad/s"),
+        (lambda b: b.reset(position_world=(1.0, 2.0)), r"position_world: .* shape \(19, 3\), got \(2,\)"),
         (lambda b: b.reset(velocity_world=(np.nan, 0.0, 0.0)), "velocity_world: expected finite numbers"),
         (
             lambda b: lapwing.BatchSimulator("hover", 1, overrides=HILL).reset(position_world=(3.0, 0.0, 0.6)),

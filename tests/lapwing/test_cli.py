@@ -53,10 +53,10 @@ BAD = {
         "scenes/hovr.toml: no such file or directory; did you mean scenes/hover",
     ),
     "folder": (["scenes"], "scenes: is a folder; expected a scene file"),
-    "log": ([HOVER, "--log", "none/a.mcap"], "none/a.mcap: cannot be written: no such file or directory"),
+    "log": ([HOVER, "--log", "none/a.mcap"], "none/a.mcap: cannot be written: there is no folder none; create it"),
     "log is a folder": ([HOVER, "--log", "scenes"], "scenes: is a folder"),
     "log is the scene": ([HOVER, "--log", HOVER], "is the same file as SCENE"),
-    "json": ([HOVER, "--json", "none/a.json"], "none/a.json: cannot be written: no such file or directory"),
+    "json": ([HOVER, "--json", "none/a.json"], "none/a.json: cannot be written: there is no folder none; create it"),
     "json is the log": ([HOVER, "--json", "a", "--log", "a"], "--json a: is the same file as --log"),
     "speed 0": ([HOVER, "--speed", "0"], "--speed 0: expected a number above 0, or max"),
     "speed nan": ([HOVER, "--speed", "nan"], "--speed nan: expected a number above 0, or max"),
@@ -95,7 +95,7 @@ BAD = {
     ),
     "keys": ([HOVER, "--keys", "x"], "--keys: expected with --listen or --endpoints"),
     "door": ([HOVER, "--listen", "x"], "--listen x: expected an endpoint protocol/address:port"),
-    "option": ([HOVER, "--lgo", "x"], "No such option: --lgo"),
+    "option": ([HOVER, "--lgo", "x"], "(see lapwing run --help)"),
     "no scene": ([], "Missing argument 'SCENE'"),
 }
 

@@ -73,11 +73,13 @@ def test_invalid_vehicle_is_lost_and_observed_within_bounds():
     assert environments.observation_space.contains(observed)
 
 
-def test_actions_that_are_not_finite_are_rejected():
+def test_invalid_actions_are_rejected():
     environments = many("Hover", 2)
     environments.reset(seed=1)
     with pytest.raises(ValueError, match="actions: expected finite numbers"):
         environments.step(np.array([[0.0, 0.0, 0.0, 0.0], [0.0, np.nan, 0.0, 0.0]]))
+    with pytest.raises(ValueError, match=r"actions: expected 4 numbers for each vehicle, shape \(2, 4\), got \(2, 3\)"):
+        environments.step(np.zeros((2, 3)))
 
 
 @pytest.mark.parametrize("task", ["Hover", "Track"])

@@ -50,7 +50,7 @@ def test_info_prints_provenance_topics_and_gaps(lapwing, tmp_path):
     assert lines["/drone1/ground_truth"].startswith("490 250 ")
     assert lines["/drone1/ground_truth"].endswith(" lapwing_msgs/msg/VehicleState 1, longest 0.044 s")
     assert "0.00 mode a;b" in " ".join(out.split())
-    assert lines["no"] == "resimulate lacks an attachment setup.json"
+    assert lines["resimulate"] == "not possible: the log lacks an attachment setup.json"
 
 
 def test_verify_recomputes_digest(lapwing, tmp_path):
@@ -167,6 +167,15 @@ def test_damaged_chunk_is_left_out_and_named(lapwing, tmp_path):
     assert times == sorted(times)
 
 
+def test_export_of_cut_log_warns(lapwing, tmp_path):
+    whole = write(tmp_path / "whole.mcap", ticks=10)
+    assert lapwing("export", whole, "--csv", "csv")[::2] == (0, "")
+    (tmp_path / "cut.mcap").write_bytes(whole.read_bytes()[:-100])
+    code, out, err = lapwing("export", "cut.mcap", "--csv", "cut")
+    assert (code, err) == (0, "cut.mcap: the log is incomplete: its end is missing, see lapwing info\n")
+    assert "cut/clock.csv" in out
+
+
 def test_export_writes_table_topic_with_units(lapwing, tmp_path):
     write(tmp_path / "a.mcap")
     code, out, _ = lapwing(
@@ -219,7 +228,7 @@ def foreign(tmp_path):
 def test_foreign_log_is_reported_with_missing_parts(lapwing, foreign):
     code, out, _ = lapwing("info", foreign)
     assert code == 0
-    assert "no report lacks a topic /NAME/ground_truth" in " ".join(out.split())
+    assert "report not possible: the log lacks a topic /NAME/ground_truth" in " ".join(out.split())
     assert "/a 3 " in " ".join(out.split())
 
 
@@ -242,7 +251,7 @@ def old(tmp_path, monkeypatch):
 def test_log_of_other_version_reports_types_and_verifies_bytes(lapwing, old):
     code, out, err = lapwing("info", old)
     assert (code, err) == (0, "")
-    assert f"no report lacks messages of this version: {OLD}" in " ".join(out.split())
+    assert f"report not possible: the log lacks messages of this version: {OLD}" in " ".join(out.split())
     assert "version 0.0.9" in " ".join(out.split())
     assert lapwing("verify", old)[0] == 0
 

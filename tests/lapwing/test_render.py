@@ -35,7 +35,8 @@ def log(tmp_path_factory):
         (("--out", "a.png", "--camera", "back"), "--camera back: expected follow, orbit, top or onboard"),
         (("--out", "a.png", "--size", "big"), "--size big: expected WIDTHxHEIGHT"),
         (("--out", "a.png", "--size", "161x120"), "--size 161x120: expected even numbers"),
-        (("--out", "a.mp4", "--fps", "0"), "--fps and --speed: expected above 0"),
+        (("--out", "a.mp4", "--fps", "0"), "--fps 0: expected a number above 0, at most 120"),
+        (("--out", "a.mp4", "--speed", "nan"), "--speed nan: expected a number above 0, at most 1000"),
         (("--out", "a.png", "--from", "9"), "expected times of the flight, 0 to 3 s"),
     ],
 )

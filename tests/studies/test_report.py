@@ -418,6 +418,14 @@ def test_legend_of_long_names_has_room_above_panels():
     assert np.diff([top(*(f"{name} {k}" for k in range(count))) for count in range(4)]).tolist() == [22, 28, 28]
 
 
+def test_cursor_between_samples_shows_value_and_full_name():
+    name = "reference, B & a long name"
+    drawn = figure(Plot((Panel((Line(np.arange(3.0), np.arange(3.0), name),)),), "", 3.0, span=(0.0, 2.0)))
+    (line,) = (trace for trace in drawn["data"] if trace["type"] == "scatter")
+    assert line["hovertemplate"] == "%{y}"  # Plotly's default is "(time, value)" unless a sample is at the cursor
+    assert drawn["layout"]["hoverlabel"]["namelength"] == -1
+
+
 def test_names_of_short_phases_are_left_out_on_phone():
     phases = (("climb", 0.0, 50.0), ("item 2 of 7", 50.0, 60.0), ("i", 60.0, 100.0))
     panel = Panel((Line(np.arange(3.0), np.arange(3.0)),))

@@ -41,6 +41,8 @@ class LogReader:
         try:
             check_regular(self.path)
             self._file = open(self.path, "rb")  # noqa: SIM115 (closed in close)
+        except IsADirectoryError:
+            raise ValueError(f"{self.path}: is a folder; expected a log (MCAP)") from None
         except OSError as error:
             raise ValueError(f"{self.path}: cannot read the log: {error.strerror}") from None
         try:

@@ -154,7 +154,10 @@ def _read(path: Path) -> str:
         return path.read_text(encoding="utf-8")
     except IsADirectoryError:
         raise SceneError("", "is a folder", "a scene file (TOML)", KeyOrigin(path)) from None
-    except UnicodeDecodeError:
+    except UnicodeDecodeError as error:
+        if error.object.startswith(b"\x89MCAP"):
+            expected = "a scene file (TOML); `lapwing resimulate` repeats the flight of a log"
+            raise SceneError("", "is a log (MCAP)", expected, KeyOrigin(path)) from None
         raise SceneError("", "not valid TOML: not a UTF-8 text file", source=KeyOrigin(path)) from None
     except OSError as error:
         similar = difflib.get_close_matches(path.name, [p.name for p in path.parent.glob("*.toml")], n=1)

@@ -149,7 +149,10 @@ def success(results: Results) -> Plot:
 
 
 def sensitivity(results: Results) -> Plot:
-    """Plot sensitivities: rank correlations, and Sobol indices if SALib is installed."""
+    """Plot sensitivities: rank correlations, and Sobol indices if SALib is installed.
+
+    Bars whose 95 % interval contains 0 are grey: chance explains them.
+    """
     keys = varied_parameters(results)
     targets = ["success"] if np.ptp(results["success"].astype(float)) > 0.0 else []
     targets += [name for name in TARGETS if name in results.figures]
@@ -168,7 +171,7 @@ def sensitivity(results: Results) -> Plot:
         indices = sobol(x[selected], y[selected], keys) if with_sobol and len(selected) >= SOBOL_MIN_RUNS else []
         for column, values in enumerate([correlations, indices][: len(kinds)]):
             bars = tuple(
-                Stretch(key, 0.0, v.value, f"{v.value:.2f}", AXIS_COLOURS[column])
+                Stretch(key, 0.0, v.value, f"{v.value:.2f}", QUIET if v.low <= 0.0 <= v.high else AXIS_COLOURS[column])
                 for key, v in zip(keys, values, strict=True)
                 if np.isfinite(v.value)
             )
@@ -186,6 +189,7 @@ def sensitivity(results: Results) -> Plot:
         if independent
         else ". Sobol indices need independent parameters, unlike those of a sweep."
     )
+    caption += " Grey: not distinguishable from 0, because the 95 % interval contains it."
     height = len(targets) * (1.1 + 0.26 * len(keys)) + 0.6
     return Plot(tuple(panels), caption, height, (1.0,) * len(targets), (1.0,) * len(kinds))
 

@@ -42,7 +42,7 @@ def figure(plot: Plot) -> dict[str, Any]:
         "annotations": [],
         "paper_bgcolor": "rgba(0,0,0,0)",
         "plot_bgcolor": "rgba(0,0,0,0)",
-        "hoverlabel": {"bgcolor": "#FFFFFF", "bordercolor": "#888888", "font": {"color": TEXT}},
+        "hoverlabel": {"bgcolor": "#FFFFFF", "bordercolor": "#888888", "font": {"color": TEXT}, "namelength": -1},
         "barmode": "overlay",
         "uniformtext": {"mode": "hide", "minsize": 10},
     }

@@ -64,6 +64,8 @@ def _line(mark: Line, panel: Panel) -> dict:
     if not line.name:
         label = text_of(panel.y_label.partition(" [")[0])
         trace["hovertemplate"] = f"{label} %{{y}}<extra></extra>"
+    elif panel.timed:
+        trace["hovertemplate"] = "%{y}"  # the cursor is between samples: Plotly would show (time, value)
     return trace
 
 

@@ -54,8 +54,9 @@ def check(target: Path, shot: Shot) -> None:
     if not all(SMALLEST <= side <= LARGEST and side % 2 == 0 for side in shot.size):
         limits = f"even numbers from {SMALLEST} to {LARGEST}"
         raise ValueError(f"--size {shot.size[0]}x{shot.size[1]}: expected {limits}, e.g. 1280x720")
-    if not (0.0 < shot.rate <= 120.0 and 0.0 < shot.speed <= 1000.0):
-        raise ValueError("--fps and --speed: expected above 0, at most 120 and 1000")
+    for option, number, largest in (("--fps", shot.rate, 120), ("--speed", shot.speed, 1000)):
+        if not 0.0 < number <= largest:
+            raise ValueError(f"{option} {number:g}: expected a number above 0, at most {largest}")
 
 
 def _check_encoder(target: Path) -> None:

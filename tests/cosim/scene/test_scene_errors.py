@@ -196,3 +196,5 @@ def test_files_that_are_no_scenes(tmp_path):
     assert "not valid TOML" in said(tmp_path / "damaged.toml")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe")
     assert "not valid TOML: not a UTF-8 text file" in said(tmp_path / "binary.toml")
+    (tmp_path / "flight.mcap").write_bytes(b"\x89MCAP0\r\n\x01")
+    assert "is a log (MCAP); expected a scene file (TOML)" in said(tmp_path / "flight.mcap")

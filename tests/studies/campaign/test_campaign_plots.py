@@ -16,6 +16,7 @@ from lapwing.studies.campaign.statistics import Interval, has_sobol
 from lapwing.studies.campaign.varied_parameters import MAX_KEYS
 from lapwing.studies.metrics import METRICS
 from lapwing.studies.report import matplotlib_figure
+from lapwing.studies.report.style import QUIET
 
 KEYS = ("a", "b")
 MANY = tuple("abcdefghijkl")
@@ -49,6 +50,14 @@ def test_missing_values_do_not_affect_other_metrics():
     assert bars(plot, "rank", "touchdown.speed")["a"] == pytest.approx(1.0)
     assert abs(bars(plot, "rank", "touchdown.speed")["b"]) < 0.2
     assert bars(plot, "rank", "energy") == pytest.approx({"a": 0.0, "b": 1.0}, abs=0.15)
+
+
+def test_correlations_within_chance_are_grey():
+    plot = sensitivity(table(12, energy=lambda drawn: drawn["b"]))
+    (panel,) = [panel for panel in plot.panels if panel.x_label == "rank correlation"]
+    colours = {bar.lane: bar.colour for bar in panel.marks}
+    assert bars(plot, "rank", "energy")["a"] != 0.0
+    assert colours["a"] == QUIET != colours["b"]
 
 
 @pytest.mark.skipif(not has_sobol(), reason="SALib is not installed: pip install lapwing[campaign]")
