@@ -132,9 +132,9 @@ class Flight(FlightData):
         flights = self._with(compare_with)
         return View(page(flights, labels(flights)), height)
 
-    def _with(self, other: studied.FlightData | None) -> list[studied.FlightData]:
+    def _with(self, other: FlightData | None) -> list[FlightData]:
         """Return this flight and the other one. Raise ValueError if the other one is not a flight."""
-        if other is not None and not isinstance(other, studied.FlightData):
+        if other is not None and not isinstance(other, FlightData):
             raise ValueError(f"compare_with: expected a flight, for example lapwing.read_log(path), got {other!r}")
         return [self] if other is None else [self, other]
 

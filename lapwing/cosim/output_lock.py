@@ -17,7 +17,8 @@ def write_errors(path: str | Path) -> Iterator[None]:
         yield
     except OSError as error:
         folder = Path(path).parent
-        reason = (error.strerror or str(error)).lower() if folder.exists() else f"there is no folder {folder}; create it"
+        known = (error.strerror or str(error)).lower()
+        reason = known if folder.exists() else f"there is no folder {folder}; create it"
         raise ValueError(f"{path}: cannot be written: {reason}") from None
 
 

@@ -4,7 +4,7 @@ import pytest
 
 from tests.faults.stress import trial
 
-RUNS, AT_ONCE = 24, 6  # six of each kind
+RUNS, AT_ONCE = 60, 6
 
 
 @pytest.mark.long

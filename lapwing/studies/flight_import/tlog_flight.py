@@ -121,7 +121,9 @@ def _messages(path: Path) -> tuple[dict[str, Columns], float, dict[str, float], 
                 systems.setdefault(sender, MessageColumns(fields)).add(message, clock)
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
-    messages = systems.get(next(iter(systems), None) if system is None else system)
+    if system is None:
+        system = next(iter(systems), None)
+    messages = None if system is None else systems.get(system)
     if messages is None:
         raise ValueError(f"{path}: has no messages of an autopilot; expected a telemetry log (.tlog)")
     columns, sessions = messages.longest_session()
