@@ -18,9 +18,9 @@ from lapwing.dynamics.vector import ZERO, Vec3, add, norm, subtract
 from lapwing.dynamics.vehicles.multirotor_slung import Sling, frequency
 from lapwing.kernels import math
 from lapwing.services.common import ports
+from lapwing.services.plant import LEAST_PART_TOLERANCE
 from lapwing.services.plant.blocks.carried_load import LoadMotion, LoadPlant
 from lapwing.services.plant.blocks.multirotor import MultirotorPlant
-from lapwing.services.plant.schema import LEAST_PART_TOLERANCE
 from lapwing.services.plant.service_config import FleetCoupling, PlantSetup
 
 PRESENCE, LOAD = "presence", "load"  # ports exchanged between the plants of a fleet

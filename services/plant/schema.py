@@ -10,13 +10,13 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vehicles.multirotor import CONTACT_TOLERANCE
 from lapwing.kernels import math
 from lapwing.services.common.communication_schema import Communication
+from lapwing.services.plant import LEAST_PART_TOLERANCE
 
 CONTACT_SHARE = 3e-5  # of solver.accuracy, for a substep in contact: bounces amplify its errors
 MANY_SUBSTEPS = 1e-4  # accuracy below which the share decreases with the number of substeps, as its fifth root
 LEAST_CONTACT_TOLERANCE = 1e-15  # below it a difference of two substeps is round-off, and no substep is short enough
 
 PART_SHARE, PART_TOLERANCE = 3e-5, 1e-5  # for systems with their own contacts; tolerance without an accuracy
-LEAST_PART_TOLERANCE = 1e-12  # its shortest substep, 1e-14 s, still advances a time of 10 s; sums are not compensated
 
 
 def contact_tolerance(accuracy: float) -> float:

@@ -68,7 +68,11 @@ ELSEWHERE = {  # other tests by option; a test's file contains the option
         ),
         "--sensors": SENSOR_FIT,
     },
-    "import": {"--mapping": IMPORT, "--out": IMPORT},
+    "import": {
+        "--mapping": IMPORT,
+        "--out": IMPORT,
+        "--vehicle": "tests/studies/flight_import/test_rosbag.py::test_command_selects_vehicle_of_bag",
+    },
     "run": {
         "--allow-code": "tests/services/fmu/test_import.py",
         "--plan": "tests/lapwing/test_environment_faults.py::test_broken_plan_is_rejected",

@@ -8,7 +8,7 @@ import pytest
 from lapwing.cosim.config.serialise import first_difference, from_json, to_json
 from lapwing.cosim.scene import SceneError
 from lapwing.dynamics.lie.quaternion import rotate
-from lapwing.services.plant.schema import LEAST_PART_TOLERANCE
+from lapwing.services.plant import LEAST_PART_TOLERANCE
 from lapwing.services.scene_resolver import from_resolved, load, parse, resolve
 from tests.cosim.memory_log import fly
 from tests.cosim.test_agreement import fly_apart

@@ -9,9 +9,9 @@ from lapwing.dynamics.terrain import LEVEL
 from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles.multirotor_slung import GROUND_DAMPING, GROUND_FREQUENCY, Sling
 from lapwing.kernels import kernel
+from lapwing.services.plant import LEAST_PART_TOLERANCE
 from lapwing.services.plant.blocks import carried_load
 from lapwing.services.plant.blocks.carried_load import LoadMotion, LoadPlant
-from lapwing.services.plant.schema import LEAST_PART_TOLERANCE
 from tests.dynamics.vehicles.rebound import rebound
 
 RK4 = get("rk4_renormalised").Method()
