@@ -16,7 +16,9 @@ from lapwing.kernels.compiler.code_libraries import _run
 
 TRIPLE = "x86_64-unknown-linux-gnu"
 PORTABLE = "x86-64-v3"  # processors since 2013
-_ALLOCATES = re.compile(r"@(NRT_Allocate\w*|NRT_MemInfo_(?:new|varsize)\w*|NRT_Reallocate|malloc)\(")
+_ALLOCATES = re.compile(  # all but the arrays of step_arrays.h
+    r"@(NRT_Allocate\w*|NRT_MemInfo_(?:alloc(?!_aligned\()|new|varsize)\w*|NRT_Reallocate|malloc)\("
+)
 _ADDRESS = re.compile(r"inttoptr \(i64 \d{5,} to")
 
 

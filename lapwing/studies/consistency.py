@@ -8,6 +8,7 @@ import math
 import numpy as np
 
 from lapwing.studies.flight_data import FlightData
+from lapwing.studies.rotation_arrays import conjugate, from_xyzw, product, rotation_vector
 
 STATES = 24  # number of error states of the estimator
 JOINT = 9  # number of states with a true value: attitude, velocity, position
@@ -63,7 +64,8 @@ def consistency(flight: FlightData) -> dict[str, float]:
     if not valid.any():
         return {}
     t, e = indices[0][valid], indices[1][valid]
-    attitude_error = _rotation_vector(truth.orientation[t], estimate.orientation[e])
+    after, before = from_xyzw(truth.orientation[t]), from_xyzw(estimate.orientation[e])
+    attitude_error = rotation_vector(product(after, conjugate(before)))
     translation_errors = [truth.velocity[t] - estimate.velocity[e], truth.position[t] - estimate.position[e]]
     value = nees(np.hstack([attitude_error, *translation_errors]), joint_covariance(reported.covariance[valid]))
     result = {
@@ -84,13 +86,3 @@ def _matching_indices(times: np.ndarray, desired: np.ndarray) -> np.ndarray:
         return np.full(len(desired), -1)
     nearest = np.minimum(np.searchsorted(times, desired - 1e-6), len(times) - 1)
     return np.where(np.abs(times[nearest] - desired) < 1e-6, nearest, -1)
-
-
-def _rotation_vector(after: np.ndarray, before: np.ndarray) -> np.ndarray:
-    """Return the world rotation vectors (n, 3) from attitudes `before` to `after`, both (n, 4) x, y, z, w."""
-    a, b = after, before * np.array([-1.0, -1.0, -1.0, 1.0])
-    vector = a[:, 3:] * b[:, :3] + b[:, 3:] * a[:, :3] + np.cross(a[:, :3], b[:, :3])
-    scalar = a[:, 3] * b[:, 3] - np.einsum("ni,ni->n", a[:, :3], b[:, :3])
-    vector, scalar = vector * np.sign(scalar + (scalar == 0.0))[:, None], np.abs(scalar)
-    size = np.linalg.norm(vector, axis=1)
-    return vector * np.where(size > 1e-12, 2.0 * np.arctan2(size, scalar) / np.maximum(size, 1e-300), 2.0)[:, None]

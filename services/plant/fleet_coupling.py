@@ -18,7 +18,6 @@ from lapwing.dynamics.vector import ZERO, Vec3, add, norm, subtract
 from lapwing.dynamics.vehicles.multirotor_slung import Sling, frequency
 from lapwing.kernels import math
 from lapwing.services.common import ports
-from lapwing.services.plant import LEAST_PART_TOLERANCE
 from lapwing.services.plant.blocks.carried_load import LoadMotion, LoadPlant
 from lapwing.services.plant.blocks.multirotor import MultirotorPlant
 from lapwing.services.plant.service_config import FleetCoupling, PlantSetup
@@ -116,7 +115,7 @@ def _load(
             raise ConfigError(f"{key}.stiffness", message, f"at most {FASTEST:g} rad: a softer cable, or a higher rate")
     field = hooks.all_fields(core.vehicle.effects, shares[owner].parameters.start.vehicle.memory, ZERO)
     method = integrators.get("rk4").Method()
-    tolerance = max(core.vehicle.tolerance, LEAST_PART_TOLERANCE)
+    tolerance = max(core.vehicle.tolerance, integrators.LEAST_TOLERANCE)
     plant = LoadPlant(tuple(carriers.values()), field, method, core.step, core.steps, core.interval, tolerance)
     inputs = tuple(PRESENCE if name == owner else neighbour_port(name, PRESENCE) for name in carriers)
     return {"load": plant, "load_start": start, "load_inputs": inputs}

@@ -10,7 +10,6 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vehicles.multirotor import CONTACT_TOLERANCE
 from lapwing.kernels import math
 from lapwing.services.common.communication_schema import Communication
-from lapwing.services.plant import LEAST_PART_TOLERANCE
 
 CONTACT_SHARE = 3e-5  # of solver.accuracy, for a substep in contact: bounces amplify its errors
 MANY_SUBSTEPS = 1e-4  # accuracy below which the share decreases with the number of substeps, as its fifth root
@@ -59,7 +58,7 @@ class Solver(SceneTable):
         """Tolerance of a substep of systems other than multirotors (`integrate_step_doubling`)."""
         if self.accuracy is None:
             return PART_TOLERANCE
-        return max(PART_SHARE * self.accuracy, LEAST_PART_TOLERANCE)
+        return max(PART_SHARE * self.accuracy, integrators.LEAST_TOLERANCE)
 
     def steps(self, exchange: Communication) -> int:
         """Return the integrator steps per communication step."""

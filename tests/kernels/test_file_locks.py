@@ -1,5 +1,6 @@
 """Locks of kernels: how long a process waits for another one that compiles the same kernel."""
 
+import os
 from types import SimpleNamespace
 
 import pytest
@@ -59,3 +60,14 @@ def test_work_of_holder_is_its_processor_time(tmp_path, monkeypatch):
         while file_locks._work_of_holder(path) == before:
             pass
     assert file_locks._work_of_holder(path) == ""
+
+
+def test_number_of_killed_holder_is_replaced(tmp_path, monkeypatch):
+    monkeypatch.setattr(cache_files, "root", lambda: tmp_path)
+    with file_locks.release_at_end():
+        file_locks.acquire("kernel")
+        path = file_locks._held.locks[0].path
+    path.write_text("4194304" * 3)
+    with file_locks.release_at_end():
+        file_locks.acquire("kernel")
+        assert int(path.read_text()) == os.getpid()

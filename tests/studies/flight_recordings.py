@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from lapwing.studies.flight_import.recording import Recording
-from lapwing.studies.flight_import.rotation_arrays import conjugate, from_vector, product, rotate, rotation_vector, unit
+from lapwing.studies.rotation_arrays import conjugate, from_vector, product, rotate, rotation_vector, unit
 from lapwing.studies.validation.plant_rows import PlantRows
 
 INTERVAL = 0.01  # [s]

@@ -18,8 +18,8 @@ def flight(ticks, rate=100, failure="", diverged=False, scene=None, **topics):
     """Return a flight of a number of ticks, from columns of topics by dotted name; single values are repeated."""
     views = {}
     for name, columns in topics.items():
-        rows = {}
-        for field, value in columns.items():
+        rows, defaults = {}, {"angular_velocity": (0.0, 0.0, 0.0)} if name == "ground_truth" else {}
+        for field, value in (defaults | columns).items():
             column = np.asarray(value)
             rows[field] = column if column.shape[:1] == (ticks,) else np.broadcast_to(column, (ticks, *column.shape))
         views[name] = TopicView(np.arange(ticks) * (10**9 // rate), rows)

@@ -26,10 +26,17 @@ from lapwing.dynamics.integrators._compensated import (
 from lapwing.dynamics.integrators._fixed_step import RATES, integrate_fixed, rate, record, step
 from lapwing.dynamics.integrators._pieces import BREAKPOINTS
 from lapwing.dynamics.integrators._solve import check_start, not_finite, simulate, solve
-from lapwing.dynamics.integrators._step_doubling import SHORTEST, StepDoubling, integrate_step_doubling, shorter
+from lapwing.dynamics.integrators._step_doubling import (
+    LEAST_TOLERANCE,
+    SHORTEST,
+    StepDoubling,
+    integrate_step_doubling,
+    shorter,
+)
 
 __all__ = [
     "BREAKPOINTS",
+    "LEAST_TOLERANCE",
     "RATES",
     "SHORTEST",
     "CompensatedSum",

@@ -76,8 +76,6 @@ class KernelLibrary(JITCodeLibrary):
         if self.no_refcount:
             noinline = [library._get_module_for_linking() for library in self._noinline.values()]
             self.no_refcount = not any(map(_allocates, (self._final_module, *noinline)))
-        if self.vectorise_loops and not isinstance(self, PureLibrary):
-            self._declare_variants()
         super().finalize()
 
     def _declare_variants(self) -> None:
@@ -95,6 +93,8 @@ class KernelLibrary(JITCodeLibrary):
             self._final_module.link_in(binding.parse_assembly(text))
 
     def _optimize_final_module(self) -> None:
+        if self.vectorise_loops:
+            self._declare_variants()
         if self.no_refcount:
             _remove_refcounts(self._final_module)
         codegen = self._codegen

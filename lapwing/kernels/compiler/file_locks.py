@@ -91,6 +91,7 @@ def _lock(path: Path) -> int:
         fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         if os.fstat(descriptor).st_nlink == 0:  # the previous holder removed the file; the next one creates a new one
             raise BlockingIOError
+        os.ftruncate(descriptor, 0)  # a holder that was killed left its number
         os.write(descriptor, str(os.getpid()).encode())
     except OSError:
         os.close(descriptor)

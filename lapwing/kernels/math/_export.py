@@ -40,8 +40,8 @@ def register_compiled(function: Callable[..., Any], kernel: Any, *, inline: bool
         return  # NUMBA_DISABLE_JIT
     floats = (types.float64,) * len(inspect.signature(kernel.py_func).parameters)
     inner = always_inline(kernel.py_func)  # never called from Python, so it gets no Python entry point
-    small = of_small and always_inline(of_small.py_func)
     inline = inline or not isinstance(inner, KernelDispatcher)  # numba's own passes cannot declare pure functions
+    small = None if inline or of_small is None else always_inline(of_small.py_func)
 
     class Implementation(AbstractTemplate):
         key = function

@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from lapwing.studies.flight_import.recording import Recording, Series
-from lapwing.studies.flight_import.rotation_arrays import body_rate, continuous, unit
 from lapwing.studies.flight_import.time_alignment import describe
+from lapwing.studies.rotation_arrays import body_rate, continuous, unit
 
 RATE = 100.0  # [Hz] sampling rate of the recording
 SHORTEST = 1.0  # [s] minimum duration of a recording

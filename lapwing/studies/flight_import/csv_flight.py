@@ -9,7 +9,8 @@ from lapwing.studies.flight_import.channels import check_density, check_rate_uni
 from lapwing.studies.flight_import.column_mapping import SCALES, Mapping, Motors, Scalar, Vector
 from lapwing.studies.flight_import.csv_table import read_columns
 from lapwing.studies.flight_import.recording import GYRO_LIMIT, LONGEST_GAP, SETPOINT_WIDTH, Recording, widen
-from lapwing.studies.flight_import.rotation_arrays import (
+from lapwing.studies.flight_import.time_alignment import describe
+from lapwing.studies.rotation_arrays import (
     body_rate,
     continuous,
     from_euler,
@@ -17,7 +18,6 @@ from lapwing.studies.flight_import.rotation_arrays import (
     ned_to_enu,
     unit,
 )
-from lapwing.studies.flight_import.time_alignment import describe
 
 FASTEST_TURN = 40.0  # [rad/s] mean rate between two measured attitudes above which tracking is lost
 FASTEST = 20.0  # [m/s] mean speed between two measured positions above which tracking is lost

@@ -16,7 +16,7 @@ import numpy as np
 from lapwing.studies.flight_import.channels import FLU, Channels, to_recording
 from lapwing.studies.flight_import.message_columns import Columns, MessageColumns
 from lapwing.studies.flight_import.recording import Recording, Series, convert, session_notes
-from lapwing.studies.flight_import.rotation_arrays import from_euler, from_ned_frd, ned_to_enu
+from lapwing.studies.rotation_arrays import from_euler, from_ned_frd, ned_to_enu
 
 FIRST_MOTOR, NINTH_MOTOR = 33, 82  # SERVOn_FUNCTION of motors 1 to 8, and 9 to 12
 OUTPUTS = 32  # highest number of an output

@@ -8,7 +8,7 @@ import numpy as np
 from lapwing.messages.topics import ACTUATORS, BARO, GPS, IMU, MAG, SETPOINT, TRUTH
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_import.recording import SETPOINT_WIDTH, Recording, Series
-from lapwing.studies.flight_import.rotation_arrays import continuous, unit
+from lapwing.studies.rotation_arrays import continuous, unit
 
 RATE = 100.0  # [Hz] of the recording
 READINGS = {  # name without the vehicle's, and fields, of each sensor's topic

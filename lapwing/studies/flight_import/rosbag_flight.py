@@ -14,7 +14,7 @@ import numpy as np
 from lapwing.studies.flight_import.channels import FLU, Channels, to_recording
 from lapwing.studies.flight_import.message_columns import NumberRows, RowLengthError
 from lapwing.studies.flight_import.recording import Recording, Series
-from lapwing.studies.flight_import.rotation_arrays import from_ned_frd, ned_to_enu, rotate, unit
+from lapwing.studies.rotation_arrays import from_ned_frd, ned_to_enu, rotate, unit
 
 PULSE_LOW, PULSE_SPAN = 1000.0, 1000.0  # [us]
 RC_OUT = "mavros_msgs/msg/RCOut"

@@ -12,7 +12,7 @@ from lapwing.studies.flight_import.channels import FLU, Channels, to_recording
 from lapwing.studies.flight_import.dataflash_flight import motor_outputs, pulse_range
 from lapwing.studies.flight_import.message_columns import Columns, MessageColumns
 from lapwing.studies.flight_import.recording import Recording, Series, convert, session_notes
-from lapwing.studies.flight_import.rotation_arrays import from_euler, from_ned_frd, ned_to_enu
+from lapwing.studies.rotation_arrays import from_euler, from_ned_frd, ned_to_enu
 
 HIGHEST_SHARE = 2.0  # values of ACTUATOR_OUTPUT_STATUS above are pulses [us]
 STANDARD_GRAVITY = 9.80665

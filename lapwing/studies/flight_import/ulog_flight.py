@@ -12,7 +12,7 @@ import numpy as np
 
 from lapwing.studies.flight_import.channels import FLU, Channels, to_recording
 from lapwing.studies.flight_import.recording import Recording, Series, convert
-from lapwing.studies.flight_import.rotation_arrays import from_euler, from_ned_frd, ned_to_enu, to_euler, unit
+from lapwing.studies.rotation_arrays import from_euler, from_ned_frd, ned_to_enu, to_euler, unit
 
 PULSE_LOW, PULSE_SPAN = 1000.0, 1000.0  # [us] of a PWM output
 GAUSS = 1e-4  # [T]

@@ -15,9 +15,9 @@ from scipy.ndimage import correlate1d
 from scipy.optimize import least_squares
 
 from lapwing.studies.flight_import.recording import Recording
-from lapwing.studies.flight_import.rotation_arrays import continuous, unit
 from lapwing.studies.identification.flight_parameters import apply_flight_parameters, is_flight_parameter
 from lapwing.studies.identification.instrumental_variables import LOSS_SCALE, Moments, loss, moments
+from lapwing.studies.rotation_arrays import continuous, unit
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.start_states import NO_TRIM, TrimMemory, start_states
 from lapwing.studies.validation.windows import Errors, Span, compare, predict_all, window_starts

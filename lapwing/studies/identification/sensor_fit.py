@@ -16,8 +16,8 @@ from lapwing.dynamics.geodesy import Home, geodetic_to_enu
 from lapwing.services.sensors.delay_line import DEPTH
 from lapwing.services.sensors.error_models import STANDARD_GRAVITY
 from lapwing.studies.flight_import.recording import Recording, Series
-from lapwing.studies.flight_import.rotation_arrays import body_rate
 from lapwing.studies.flight_import.time_alignment import time_offset
+from lapwing.studies.rotation_arrays import body_rate
 
 SHORTEST_REST = 2.0  # [s] minimum time without motor commands that counts as rest
 LONG_REST = 100.0  # [s] minimum rest for the estimation of slow errors of the IMU

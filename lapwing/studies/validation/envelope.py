@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import welch
 
-from lapwing.studies.flight_import.rotation_arrays import conjugate, rotate
+from lapwing.studies.rotation_arrays import conjugate, rotate
 from lapwing.studies.validation.prediction_metrics import magnitudes
 from lapwing.studies.validation.procedure import FlightErrors, Validation
 

@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from lapwing.studies.flight_import.recording import Recording
-from lapwing.studies.flight_import.rotation_arrays import conjugate, from_vector, product, rotate, rotation_vector
+from lapwing.studies.rotation_arrays import conjugate, from_vector, product, rotate, rotation_vector
 from lapwing.studies.validation.windows import POWER, WIDTH, Errors, compare
 
 SLICE = 5  # samples of commands averaged by one regressor

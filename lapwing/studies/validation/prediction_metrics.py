@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lapwing.studies.flight_import.recording import Recording
-from lapwing.studies.flight_import.rotation_arrays import from_vector, product
+from lapwing.studies.rotation_arrays import from_vector, product
 from lapwing.studies.validation.windows import POWER, WIDTH, Errors, compare
 
 FIELDS = ("position", "velocity", "attitude", "rate", "specific_force", "power")

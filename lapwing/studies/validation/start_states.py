@@ -6,7 +6,7 @@ import numpy as np
 from scipy.signal import lfilter
 
 from lapwing.studies.flight_import.recording import Recording
-from lapwing.studies.flight_import.rotation_arrays import conjugate, rotate
+from lapwing.studies.rotation_arrays import conjugate, rotate
 from lapwing.studies.validation.plant_rows import MOTION, PlantRows
 
 PIECE = 400  # samples per piece of a flight; pieces are stepped in parallel

@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lapwing.studies.flight_import.recording import LOWEST, Recording
-from lapwing.studies.flight_import.rotation_arrays import conjugate, product, rotate, rotation_vector
+from lapwing.studies.rotation_arrays import conjugate, product, rotate, rotation_vector
 from lapwing.studies.validation.plant_rows import MOTION, PlantRows
 from lapwing.studies.validation.start_states import StartStates
 

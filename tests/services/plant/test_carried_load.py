@@ -7,8 +7,8 @@ import pytest
 
 from lapwing.cosim.config.serialise import first_difference, from_json, to_json
 from lapwing.cosim.scene import SceneError
+from lapwing.dynamics.integrators import LEAST_TOLERANCE
 from lapwing.dynamics.lie.quaternion import rotate
-from lapwing.services.plant import LEAST_PART_TOLERANCE
 from lapwing.services.scene_resolver import from_resolved, load, parse, resolve
 from tests.cosim.memory_log import fly
 from tests.cosim.test_agreement import fly_apart
@@ -104,11 +104,11 @@ def test_static_cables_carry_weight(recorded_flight):
 
 
 def test_strictest_accuracy_keeps_load_substeps_above_round_off(tmp_path):
-    """With the tolerance of the vehicles round-off rejects every substep, and a communication step never ends."""
+    """Round-off rejects every substep at the tolerance of the vehicles, and a communication step never ends."""
     setup = resolve(two(tmp_path, "solver.accuracy=1e-12", "solver.step=0.001"))
     plants = [config.parameters for config in setup.services["plant"].parameters.given]
     assert [plant.core.vehicle.tolerance for plant in plants] == [1e-15, 1e-15]
-    assert [plant.others.load.tolerance for plant in plants if plant.others.load] == [LEAST_PART_TOLERANCE]
+    assert [plant.others.load.tolerance for plant in plants if plant.others.load] == [LEAST_TOLERANCE]
 
 
 def test_first_carrier_publishes_load(recorded_flight):

@@ -4,12 +4,11 @@ import pytest
 
 from lapwing.cosim.diagram.compiled_block import InputSample
 from lapwing.dynamics.effects._vehicle_interaction import NeighbourState
-from lapwing.dynamics.integrators import get
+from lapwing.dynamics.integrators import LEAST_TOLERANCE, get
 from lapwing.dynamics.terrain import LEVEL
 from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles.multirotor_slung import GROUND_DAMPING, GROUND_FREQUENCY, Sling
 from lapwing.kernels import kernel
-from lapwing.services.plant import LEAST_PART_TOLERANCE
 from lapwing.services.plant.blocks import carried_load
 from lapwing.services.plant.blocks.carried_load import LoadMotion, LoadPlant
 from tests.dynamics.vehicles.rebound import rebound
@@ -30,7 +29,7 @@ def move_load_for(p, x, carrier, ticks):
 
 def closed_form(hook, start, velocity, steps):
     """Return height and vertical speed of a weightless load under a fixed hook."""
-    p = LoadPlant((SLING,), ZERO, RK4, INTERVAL / steps, steps, INTERVAL, LEAST_PART_TOLERANCE)
+    p = LoadPlant((SLING,), ZERO, RK4, INTERVAL / steps, steps, INTERVAL, LEAST_TOLERANCE)
     carrier = NeighbourState(hook_world=(0.0, 0.0, hook))
     x = move_load_for(p, LoadMotion((0.0, 0.0, start), (0.0, 0.0, velocity)), carrier, round(SECONDS / INTERVAL))
     return x.load_position[2], x.load_velocity[2]

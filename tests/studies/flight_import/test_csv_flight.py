@@ -8,8 +8,8 @@ from scipy.interpolate import CubicSpline
 from lapwing.studies.flight_import.column_mapping import load_mapping
 from lapwing.studies.flight_import.csv_flight import from_columns, read_csv_flight
 from lapwing.studies.flight_import.open_flight import open_flight
-from lapwing.studies.flight_import.rotation_arrays import from_ned_frd, from_vector, product, rotate, rotation_vector
 from lapwing.studies.flight_import.time_alignment import clock_drift, time_offset
+from lapwing.studies.rotation_arrays import from_ned_frd, from_vector, product, rotate, rotation_vector
 from lapwing.studies.validation.plant_rows import PlantRows
 
 

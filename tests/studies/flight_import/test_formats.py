@@ -25,7 +25,7 @@ from scipy.spatial.transform import Rotation
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_import.dataflash_flight import read_dataflash_flight
 from lapwing.studies.flight_import.open_flight import open_flight
-from lapwing.studies.flight_import.rotation_arrays import conjugate, product, rotation_vector
+from lapwing.studies.rotation_arrays import conjugate, product, rotation_vector
 
 
 @pytest.mark.parametrize("name", WRITERS)

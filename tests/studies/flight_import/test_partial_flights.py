@@ -11,7 +11,7 @@ from flight_writers import GRAVITY, SAMPLES
 
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_import.open_flight import open_flight
-from lapwing.studies.flight_import.rotation_arrays import to_euler
+from lapwing.studies.rotation_arrays import to_euler
 
 
 def run(*arguments):

@@ -4,7 +4,7 @@ import numpy as np
 
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import over
-from lapwing.studies.report.plot import Line, NotRecordedError, Panel, Plot
+from lapwing.studies.report.plot import Line, Panel, Plot
 from lapwing.studies.report.style import AXIS_COLOURS
 
 ORDER = 15
@@ -15,8 +15,6 @@ PAIRED = "gyrostat"  # model whose rates are also drawn in pairs
 
 def draw(flight: FlightData) -> Plot:
     """Plot three rates over time, and each pair of them on the right for a satellite."""
-    if "angular_velocity" not in flight.truth.fields:
-        raise NotRecordedError("the log has no angular velocity")
     paired = flight.origin.scene.get("vehicle", {}).get("model") == PAIRED
     t, omega = flight.truth.times, flight.truth.angular_velocity
     panels = []

@@ -5,6 +5,11 @@ import numpy as np
 SMALL = 1e-9  # [rad]
 
 
+def from_xyzw(q: np.ndarray) -> np.ndarray:
+    """Return quaternions of messages, which are x, y, z, w."""
+    return q[..., [3, 0, 1, 2]]
+
+
 def unit(q: np.ndarray) -> np.ndarray:
     """Return the normalised quaternions; NaN where the norm is 0."""
     with np.errstate(invalid="ignore", divide="ignore"):
@@ -12,15 +17,15 @@ def unit(q: np.ndarray) -> np.ndarray:
 
 
 def product(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    """Return the quaternion products a b."""
+    """Return the quaternion products a b; that of an inverse and its rotation has no vector part."""
     aw, ax, ay, az = np.moveaxis(a, -1, 0)
     bw, bx, by, bz = np.moveaxis(b, -1, 0)
     return np.stack(
         [
             aw * bw - ax * bx - ay * by - az * bz,
-            aw * bx + ax * bw + ay * bz - az * by,
-            aw * by - ax * bz + ay * bw + az * bx,
-            aw * bz + ax * by - ay * bx + az * bw,
+            (aw * bx + ax * bw) + (ay * bz - az * by),
+            (aw * by + ay * bw) + (az * bx - ax * bz),
+            (aw * bz + az * bw) + (ax * by - ay * bx),
         ],
         axis=-1,
     )
