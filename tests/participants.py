@@ -17,3 +17,11 @@ def participants(launcher):
                 if name in names:
                     result[name] = int(child)
     return result
+
+
+def running(process):
+    """Return whether a process runs; one that ended and waits for its parent does not."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False

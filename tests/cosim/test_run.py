@@ -18,7 +18,7 @@ from lapwing.messages import BodyStates, VehicleState
 from lapwing.runs.single_process_run import fly_single
 from lapwing.services.scene_resolver import load, resolve
 from tests.endpoints import loopback_endpoints
-from tests.participants import participants
+from tests.participants import participants, running
 
 pytestmark = pytest.mark.long
 
@@ -104,14 +104,6 @@ class Running:
             if running(pid):
                 os.kill(pid, signal.SIGKILL)
         self.launcher.communicate()
-
-
-def running(pid):
-    try:
-        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
-    except OSError:
-        return False
-    return state != "Z"  # ended, and not collected by a parent that is gone
 
 
 @pytest.fixture

@@ -19,7 +19,7 @@ from lapwing.services.process_table import required_processes
 from lapwing.services.scene_resolver import load, resolve
 from tests.faults import campaign, leak_checks, network_partition
 from tests.faults.fault_types import FROZEN, FULL, INTERRUPT, KINDS, LAUNCHER
-from tests.participants import participants
+from tests.participants import participants, running
 
 SCENES = {  # overrides that make a flight of a few seconds
     "hover": ["run.duration=5"],
@@ -182,13 +182,6 @@ def _fill(path: Path) -> None:
 def _gone(pids: dict[str, int], seconds: float) -> list[str]:
     """Return the processes that remain after a time."""
     deadline = time.monotonic() + seconds
-    while (left := [name for name, pid in pids.items() if _running(pid)]) and time.monotonic() < deadline:
+    while (left := [name for name, pid in pids.items() if running(pid)]) and time.monotonic() < deadline:
         time.sleep(0.05)
     return left
-
-
-def _running(pid: int) -> bool:
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False

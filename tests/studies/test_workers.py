@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 
 from lapwing.studies.workers import workers
+from tests.participants import running
 
 pytestmark = pytest.mark.long
 
@@ -29,13 +30,6 @@ if __name__ == "__main__":
         print(*pool._processes, flush=True)
         busy[0].result()
 """
-
-
-def running(pid):
-    try:
-        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
-    except OSError:
-        return False
 
 
 @pytest.mark.parametrize("number", [signal.SIGKILL, signal.SIGINT, signal.SIGTERM])

@@ -5,7 +5,6 @@ import signal
 import subprocess
 import sys
 import time
-from pathlib import Path
 
 import pytest
 from betaflight_peer import Peer, free_ports
@@ -16,6 +15,7 @@ from lapwing.cosim.scene import SceneError
 from lapwing.flight import Flight
 from lapwing.runs.resimulate import resimulate
 from lapwing.services.scene_resolver import load
+from tests.participants import running
 
 TIMEOUT = 900  # [s]
 FLEET = """
@@ -107,8 +107,7 @@ def test_firmware_ends_with_killed_run(tmp_path):
         os.kill(run.pid, signal.SIGKILL)
         run.wait()
     deadline = time.monotonic() + TIMEOUT
-    state = Path(f"/proc/{pid}/stat")
-    while state.exists() and ") Z " not in state.read_text():
+    while running(pid):
         assert time.monotonic() < deadline
         time.sleep(0.05)
 

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from contextlib import suppress
 from pathlib import Path
 
 import numpy as np
@@ -99,9 +100,17 @@ def test_loop_through_own_blocks_is_one_line(folder: Path) -> None:
 
 
 def host_processes(parent: int) -> list[int]:
-    """Return the processes of FMUs among the children of a process."""
-    children = Path(f"/proc/{parent}/task/{parent}/children").read_text().split()
-    return [int(pid) for pid in children if b"lapwing.services.fmu.host" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    """Return the processes of FMUs among the children of a process.
+
+    Other children, such as a compiler's, may end between the two readings.
+    """
+    result = []
+    with suppress(OSError):
+        for child in Path(f"/proc/{parent}/task/{parent}/children").read_text().split():
+            with suppress(OSError):
+                if b"lapwing.services.fmu.host" in Path(f"/proc/{child}/cmdline").read_bytes():
+                    result.append(int(child))
+    return result
 
 
 def test_each_fmu_has_process_and_killed_one_is_named(folder: Path) -> None:

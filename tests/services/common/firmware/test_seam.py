@@ -4,7 +4,6 @@ import json
 import re
 import subprocess
 import sys
-from pathlib import Path
 
 import pytest
 
@@ -25,6 +24,7 @@ from lapwing.services.common.firmware.service import firmware_service
 from lapwing.services.common.ports import BatteryReading
 from lapwing.services.common.vehicle_schema import airframe
 from lapwing.services.scene_resolver import load, resolve
+from tests.participants import running
 
 QUAD = ["run.duration=1.0", "run.real_time_factor=1000.0"]
 
@@ -218,9 +218,8 @@ def test_program_and_its_children_end():
     child = int(program.text())
     program.close()
     assert not program.running
-    state = Path(f"/proc/{child}/stat")
     patience = Patience(60.0)
-    while state.exists() and ") Z " not in state.read_text():  # a zombie has ended too
+    while running(child):
         assert not patience.over
 
 
