@@ -4,8 +4,7 @@
 #   docker compose build         where both can
 #
 # BASE is any image with Debian bookworm, Python 3.11 with pip, passwd and openssl; deploy/base-image.sh makes one.
-# Debian's release is part of the numbers: the kernels call its mathematical library. Written so that the classic builder
-# of older engines takes it too: no mounts, no here-documents.
+# Written so that the classic builder of older engines takes it too: no mounts, no here-documents.
 ARG BASE=python:3.11-slim-bookworm
 # An image with the pinned wheels in /wheels (deploy/wheels.sh): in the context they would be sent again for each image.
 ARG WHEELS
@@ -50,7 +49,8 @@ CMD ["lapwing", "--help"]
 FROM packages AS built
 # The command, which finds the sources in /app.
 COPY pyproject.toml README.md LICENSE ./
-RUN pip --python /opt/lapwing/bin/python install --prefix /image/opt/lapwing --no-deps --no-build-isolation --no-index \
+COPY --from=dependencies /opt/backend /opt/backend
+RUN PYTHONPATH=/opt/backend pip --python /opt/lapwing/bin/python install --prefix /image/opt/lapwing --no-deps --no-build-isolation --no-index \
         --no-cache-dir --no-warn-script-location --config-settings editable_mode=compat --editable . && \
     mkdir -p /image/app && cp -rp /image/opt/lapwing/. /opt/lapwing/
 # With kernels of an earlier image, if deploy/build.sh has found one: what has not changed is not compiled again.

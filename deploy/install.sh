@@ -1,5 +1,6 @@
 #!/bin/sh
-# Build step of the Dockerfile: installs the pinned packages to /opt/lapwing, those of the tests to /opt/lapwing-tests.
+# Build step of the Dockerfile: installs the pinned packages to /opt/lapwing, those of the tests to /opt/lapwing-tests,
+# and the build backend to /opt/backend, which is in no image.
 set -eu
 cd /build
 
@@ -14,4 +15,6 @@ for lock in requirements*.lock; do
         *) pip --python /opt/lapwing/bin/python install --no-deps -r "$lock" ;;
     esac
 done
+mkdir /opt/backend
+(cd /opt/lapwing/lib/python3.*/site-packages && mv setuptools* _distutils_hack distutils-precedence.pth /opt/backend/)
 python3 slim.py /opt/lapwing/lib/python3.*/site-packages /opt/lapwing-tests
