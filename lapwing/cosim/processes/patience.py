@@ -4,7 +4,7 @@ import os
 import time
 from collections.abc import Callable
 
-from lapwing.cosim.processes.cpu_starvation import starved_time
+from lapwing.cosim.processes.cpu_starvation import machine_stall_time, starved_time
 
 EXTENSION = 6.0  # limit of an extended time-out, as its multiple
 
@@ -40,6 +40,7 @@ class Patience:
         """Start the time-out again."""
         self._start = self._clock()
         self._before: dict[int, float] = {}
+        self._stall_before = 0.0
 
     @property
     def over(self) -> bool:
@@ -47,7 +48,9 @@ class Patience:
         elapsed = self._clock() - self._start
         if elapsed > 0.5 * self.timeout and not self._before:  # reading it takes time, and most waits are short
             self._before = {pid: starved_time(pid) for pid in self._pids}
+            self._stall_before = machine_stall_time()
         if elapsed <= self.timeout:
             return False
         starved = sum(max(0.0, starved_time(pid) - before) for pid, before in self._before.items())
+        starved += machine_stall_time() - self._stall_before
         return elapsed > self._longest or elapsed - starved > self.timeout

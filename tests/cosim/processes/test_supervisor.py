@@ -43,6 +43,7 @@ class Run:
         monkeypatch.setattr("lapwing.cosim.processes.run_monitor.time.monotonic", lambda: self.now)
         # on a busy machine, the starvation of this process would extend the fake times
         monkeypatch.setattr("lapwing.cosim.processes.cpu_starvation._scheduled", lambda pid: (0.0, 0.0))
+        monkeypatch.setattr("lapwing.cosim.processes.cpu_starvation.machine_stall_time", lambda: 0.0)
         self.monitor = RunMonitor(bus, PublisherIds("test"), NAMES)
         self.monitor.poll = self.pass_time
         own = [name for name in [*NAMES, "mavlink"] if name not in external]

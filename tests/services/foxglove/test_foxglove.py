@@ -186,7 +186,7 @@ def test_foxglove_shows_running_flight(tmp_path, scene, vehicle, more):
         "--speed",
         "1",
         "--set",
-        "run.duration=3",
+        "run.duration=300",
         "--set",
         "success.require=[]",
         "--log",
@@ -204,8 +204,8 @@ def test_foxglove_shows_running_flight(tmp_path, scene, vehicle, more):
             if isinstance(message, bytes) and message[0] == 1:
                 _, subscription, time_ns = struct.unpack_from("<BIQ", message)
                 (events if subscription else actual).append((time_ns, message[13:]))
-            if len(actual) > 100 and events and not stopped:
-                run.send_signal(signal.SIGINT)  # independent of the client's subscription time
+            if len(actual) > 200 and events and not stopped:
+                run.send_signal(signal.SIGINT)  # at any time after the subscription
                 stopped = True
         assert run.wait(timeout=60) == 130
     with LogReader(path) as read:
@@ -214,7 +214,7 @@ def test_foxglove_shows_running_flight(tmp_path, scene, vehicle, more):
     first = flights.index(actual[0])
     both = min(len(actual), len(flights) - first)  # the viewer may see a few messages more than an aborted run records
     assert actual[:both] == flights[first : first + both]  # complete and in order
-    assert both > 90
+    assert both > 100
     assert events
     assert set(events) <= set(kept)
     # a viewer that subscribes late receives the earlier events as well; `kept` has later events too
