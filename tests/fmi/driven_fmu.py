@@ -2,6 +2,7 @@
 
 import ctypes
 import shutil
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 import fmpy
@@ -13,6 +14,8 @@ from recorded_ports import RecordedPorts
 
 from lapwing.fmi.exported_part import ExportedPart
 from lapwing.fmi.variables import variables_of
+
+TYPES = {2: {"real": "Real", "integer": "Integer"}, 3: {"real": "Float64", "integer": "Int32"}}  # of the functions
 
 
 class Slave:
@@ -44,18 +47,31 @@ class Slave:
     def begin(self, **start: float) -> None:
         for name, value in start.items():
             self.set(name, value)
+        self.prepare()
+        self.fmu.exitInitializationMode()
+
+    def prepare(self) -> None:
+        """Enter initialisation mode."""
         if not self.is_3:
             self.fmu.setupExperiment(startTime=0.0)
         self.fmu.enterInitializationMode()
-        self.fmu.exitInitializationMode()
 
     def get(self, name: str) -> float:
-        read = self.fmu.getFloat64 if self.is_3 else self.fmu.getReal
-        return read([self.references[name]])[0]
+        return self.values("real", [name])[0]
 
     def set(self, name: str, value: float) -> None:
-        write = self.fmu.setFloat64 if self.is_3 else self.fmu.setReal
-        write([self.references[name]], [value])
+        self.set_values("real", {name: value})
+
+    def values(self, kind: str, names: Sequence[str]) -> list[float]:
+        """Return variables of one type: real, integer or boolean."""
+        return getattr(self.fmu, f"get{self._type(kind)}")([self.references[name] for name in names])
+
+    def set_values(self, kind: str, values: Mapping[str, float]) -> None:
+        references = [self.references[name] for name in values]
+        getattr(self.fmu, f"set{self._type(kind)}")(references, list(values.values()))
+
+    def _type(self, kind: str) -> str:
+        return TYPES[3 if self.is_3 else 2].get(kind, "Boolean")
 
     def step(self, size: float = 0.004) -> None:
         self.fmu.doStep(currentCommunicationPoint=self.time, communicationStepSize=size)
@@ -88,23 +104,23 @@ class Slave:
 
 
 def assert_recorded_outputs(path: Path, exported: ExportedPart, recorded: RecordedPorts) -> None:
-    """Drive an FMU of FMI 3.0 with recorded inputs, and compare all outputs at every tick bit for bit."""
-    inputs = [v for v in variables_of(exported) if v.causality == "input"]
-    outputs = [v for v in variables_of(exported) if v.causality == "output"]
-    assert outputs
+    """Drive an FMU with recorded inputs, and compare all outputs at every tick bit for bit."""
+    kinds = ("real", "integer", "boolean")
+    inputs, outputs = (
+        {kind: [v for v in variables_of(exported) if (v.causality, v.type) == (causality, kind)] for kind in kinds}
+        for causality in ("input", "output")
+    )
+    assert any(outputs.values())
     a = Slave(path)
-    kinds = {"real": "Float64", "integer": "Int32", "boolean": "Boolean"}
 
     def set_inputs(tick: int) -> None:
         """Set the samples that a tick reads; simulate_fmu would initialise with those of tick 1."""
         rows = np.concatenate([[], *(recorded.latest(p.port.name, tick - p.lag) for p in exported.inputs)])
-        for kind, name in kinds.items():
-            own = [v for v in inputs if v.type == kind]
+        for kind, own in inputs.items():
             if own and tick >= max(p.lag for p in exported.inputs):
-                values = [float(rows[v.offset]) if kind == "real" else int(rows[v.offset]) for v in own]
-                getattr(a.fmu, f"set{name}")([a.references[v.name] for v in own], values)
+                a.set_values(kind, {v.name: (float if kind == "real" else int)(rows[v.offset]) for v in own})
 
-    a.fmu.enterInitializationMode()
+    a.prepare()
     set_inputs(0)
     a.fmu.exitInitializationMode()
     for tick in range(recorded.ticks):
@@ -112,10 +128,9 @@ def assert_recorded_outputs(path: Path, exported: ExportedPart, recorded: Record
             set_inputs(tick)
             a.time = (tick - 1) * recorded.setup.interval
             a.step(recorded.setup.interval)
-        for kind, name in kinds.items():
-            own = [v for v in outputs if v.type == kind]
+        for kind, own in outputs.items():
             if own:
-                values = getattr(a.fmu, f"get{name}")([a.references[v.name] for v in own])
+                values = a.values(kind, [v.name for v in own])
                 expected = [recorded.latest(exported.outputs[v.port].port.name, tick)[v.offset] for v in own]
                 assert np.array_equal(np.array(values, float), expected, equal_nan=True), f"{kind} at tick {tick}"
     a.close()
