@@ -70,6 +70,10 @@ def effects(
     scene: SceneFile,
     set_: Overrides = None,
     tolerance: Annotated[float, typer.Option(metavar="M", help="largest permitted change of the trajectory")] = 0.01,
+    only: Annotated[
+        str | None,
+        typer.Option(metavar="NAME,...", help="effects to study; all without this option"),
+    ] = None,
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the result as JSON")] = None,
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="write a plot (PNG, SVG or PDF)")] = None,
 ) -> None:
@@ -86,10 +90,11 @@ def effects(
     if not tolerance > 0.0:
         raise ValueError(f"--tolerance {tolerance:g}: expected a distance above 0 m")
     screen = console()
+    names = None if only is None else [name.strip() for name in only.split(",")]
 
     def find() -> Study:
         with StudyProgress(screen, "flights") as progress:
-            return study(load(scene, set_ or []), tolerance, progress.say)
+            return study(load(scene, set_ or []), tolerance, progress.say, names)
 
     _study("SCENE", scene, json, plot, screen, find, console_output)
 

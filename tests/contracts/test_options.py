@@ -39,7 +39,8 @@ COMMANDS = {  # run here, in this order, in one folder
     "new vehicle": "new vehicle my_quad --set mass=2.0",
     "diagram": "protocol hover --plot protocol.svg",
     "accuracy": f"accuracy {GYROSTAT} --set run.duration=5 --target 1e-3 --json accuracy.json --plot accuracy.png",
-    "effects": "effects hover --set run.duration=0.2 --tolerance 0.02 --json effects.json --plot effects.svg",
+    "effects": "effects hover --set run.duration=0.2 --tolerance 0.02 --only gravity,air_density --json effects.json"
+    " --plot effects.svg",
     "stability sweep": "stability edges --sweep",
     "excitation": "run excitation --mode single-process --log excitation.mcap",
     "tune": "tune hover --set run.seed=2 --altitude 3.1 --yaw 2.1 --attitude 12 --position 1.5"

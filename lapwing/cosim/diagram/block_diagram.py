@@ -14,14 +14,13 @@ import numpy as np
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.compiled_block import Block, BoundBlock, bind
 from lapwing.cosim.diagram.execution_groups import ExecutionGroup, advance_groups, independent_groups
-from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
+from lapwing.cosim.diagram.port_rows import PortRows
+from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.diagram.topic_encoder import RecordBatch, TopicEncoder, due_ticks, encode, to_record_batches
 from lapwing.cosim.run_errors import DivergedError, LockStepError
-from lapwing.kernels.row_packing import pack_row, row_unpacker, row_width
 from lapwing.messages.topics import Topic
 
 NEVER = 2**62  # [tick]
-SPARE = 8  # rows of a port in addition to those of a tick block
 
 
 @dataclass
@@ -61,7 +60,7 @@ class ExternalBlock:
         return NEVER
 
 
-class BlockDiagram:
+class BlockDiagram(PortRows):
     """Block diagram of one or more services.
 
     Attributes:
@@ -90,12 +89,12 @@ class BlockDiagram:
         self.setup, self.services = setup, services
         self.tick, self.ended = 0, False
         parts = [part for service in services for part in service.parts]
-        self.ports = dict(setup.ports)
+        ports = dict(setup.ports)
         for part in parts:
-            self.ports |= {port.name: port for port in part.outputs}
+            ports |= {port.name: port for port in part.outputs}
         port_names = {port.name for part in parts for port in part.outputs}
         port_names |= {i.port for part in parts for i in getattr(part, "inputs", ())}
-        unknown = sorted(port_names - self.ports.keys())
+        unknown = sorted(port_names - ports.keys())
         if unknown:
             raise LockStepError(f"no service of this scene publishes {', '.join(unknown)}")
         delays: dict[str, int] = {}
@@ -103,10 +102,7 @@ class BlockDiagram:
             for i in getattr(part, "inputs", ()):
                 delays[i.port] = max(delays.get(i.port, 0), i.delay)
         depths = {name: setup.last_tick + 1 if name in whole else page + delays.get(name, 0) for name in port_names}
-        self._rows = {} if rows is None else rows
-        for name in sorted(port_names):
-            self._rows[name] = _ring(self.ports[name], depths[name], delays.get(name, 0), self._rows.get(name))
-        self._readers: dict[str, Callable[[np.ndarray], Any]] = {}  # by port
+        super().__init__(ports, depths, delays, rows)
         self._parts = parts
         self._codes: list[BoundBlock | None] = []
         for part in parts:
@@ -189,41 +185,6 @@ class BlockDiagram:
         for group in self._groups:
             group.finish()
 
-    def has(self, port: str) -> bool:
-        """Return True if a block of this diagram reads or writes the port."""
-        return port in self._rows
-
-    def latest(self, port: str, tick: int) -> Any:
-        """Return the value of a port at the last tick up to `tick` at which one was due."""
-        period = max(1, self.ports[port].period)
-        if port not in self._readers:
-            self._readers[port] = row_unpacker(self.ports[port].like)
-        return self._readers[port](self._rows[port][self._index(port, tick - tick % period)])
-
-    def put(self, port: str, tick: int, value: Any) -> None:
-        """Set the value of a port at `tick`."""
-        self._rows[port][self._index(port, tick)] = pack_row(value)
-
-    def put_row(self, port: str, tick: int, row: np.ndarray) -> None:
-        """Set the row of a port at `tick`, shape (width,)."""
-        self._rows[port][self._index(port, tick)] = row
-
-    def put_rows(self, port: str, ticks: np.ndarray, rows: np.ndarray) -> None:
-        """Set the rows of a port at `ticks` (n,), shape (n, width)."""
-        self._rows[port][self._index(port, ticks)] = rows
-
-    def row(self, port: str, tick: int) -> np.ndarray:
-        """Return the row of a port at `tick`, shape (width,)."""
-        return self._rows[port][self._index(port, tick)]
-
-    def ring(self, port: str) -> np.ndarray:
-        """Return the ring buffer of a port, shape (2^k, width); the row of a tick is number tick // period mod 2^k."""
-        return self._rows[port]
-
-    def rows(self, port: str, ticks: np.ndarray) -> np.ndarray:
-        """Return the rows of a port at recent `ticks` (n,), shape (n, width)."""
-        return self._rows[port][self._index(port, ticks)]
-
     def history(self, port: str, every: int) -> np.ndarray:
         """Return the rows of a port with full history, every `every` ticks from 0; a view, shape (n, width)."""
         period = self.ports[port].period
@@ -254,20 +215,6 @@ class BlockDiagram:
             if not keep:
                 service.messages = [m for m in service.messages if m[1] >= stop]
         return result
-
-    def _index(self, port: str, ticks: Any) -> Any:
-        period = self.ports[port].period
-        return 0 if period == LATCHED else (ticks // period) & (len(self._rows[port]) - 1)
-
-
-def _ring(port: Port, ticks: int, delay: int, former: np.ndarray | None) -> np.ndarray:
-    """Return rows for `ticks` ticks, in the memory of `former` if it has the same shape."""
-    rows = 1 if port.period == LATCHED else -(-ticks // port.period) + SPARE
-    shape = 1 << (rows - 1).bit_length(), max(1, row_width(port.like))
-    if former is None or former.shape != shape:
-        return np.zeros(shape)
-    former[: SPARE + delay] = former[-SPARE - delay :] = 0.0  # rows of ticks before 0 are read before they are written
-    return former
 
 
 def _divergence_error(name: str) -> Any:

@@ -1,7 +1,7 @@
 """Procedure of `lapwing effects`: each effect removed or added once, then the smallest sufficient set."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -71,29 +71,29 @@ class Study(NamedTuple):
         return [r for r in self.rows if not r.active and r.influence and r.influence.trajectory > self.within]
 
 
-def study(scene: Scene, within: float, report: Callable[[str, int, int], None]) -> Study:
+def study(
+    scene: Scene, within: float, report: Callable[[str, int, int], None], only: Collection[str] | None = None
+) -> Study:
     """Fly the scene without each of its effects, with each of the others, and with reduced sets.
 
     Args:
         scene: scene of a multirotor.
         within: [m] largest distance of the flight with the smallest set from that of the scene.
         report: called with a description of the work, the number of finished flights, and their total.
+        only: names of the effects to remove or add; None for all.
 
     Raises:
-        ValueError: the scene's model has no effects, or the flight of the scene fails.
+        ValueError: the scene's model has no effects, `only` has an unknown one, or the flight of the scene fails.
     """
     if not scene.has(Autopilot):
         raise ValueError(f"{scene.path}: the model {scene[Vehicle].model} has no effects; expected a multirotor")
     tables = scene[Effects].tables
-    variants_without = {name: _without(tables, name) for name in tables}
-    single_vehicle_effects = [
-        name for name in effects.names() if effects.parameter_class(name) not in INTERACTION
-    ]  # without other vehicles
-    variants_with = {name: {**tables, name: {}} for name in single_vehicle_effects if name not in tables}
+    names = sorted({*effects.names(), *tables}) if only is None else sorted(set(only))
+    classes = {name: effects.parameter_class(name) for name in names if name not in tables}
+    multi_vehicle_effects = [name for name, kind in classes.items() if kind in INTERACTION]
+    variants_without = {name: _without(tables, name) for name in tables if name in names}
+    variants_with = {name: {**tables, name: {}} for name in classes if name not in multi_vehicle_effects}
     errors = {name: why for name, v in (variants_without | variants_with).items() if (why := check_effects(scene, v))}
-    multi_vehicle_effects = [
-        name for name in effects.names() if name not in single_vehicle_effects and name not in tables
-    ]
     valid_variants = {name: v for name, v in (variants_without | variants_with).items() if name not in errors}
     result: dict[str, Influence] = {}
     with variant_pool(scene) as pool:
@@ -112,12 +112,12 @@ def study(scene: Scene, within: float, report: Callable[[str, int, int], None]) 
             pool, tables, reference, removable, within, lambda text: report(text, count, count + 1)
         )
     report("measuring the plant's steps", count + 1, count + 1)
-    names = list(valid_variants)
+    order = list(valid_variants)
     full_cost, smallest_cost, *variant_costs = all_costs = costs(scene, [tables, smallest, *valid_variants.values()])
     rows = []
     for name in sorted(variants_without) + sorted(variants_with):
         sign = 1.0 if name in variants_without else -1.0
-        without = variant_costs[names.index(name)] if name in valid_variants else (math.nan, math.nan)
+        without = variant_costs[order.index(name)] if name in valid_variants else (math.nan, math.nan)
         airborne, standing = (sign * (a - b) for a, b in zip(full_cost[:2], without[:2], strict=True))
         rows.append(Row(name, name in variants_without, result.get(name), airborne, standing, errors.get(name, "")))
     unknown = math.nan, math.nan

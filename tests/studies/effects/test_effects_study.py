@@ -85,8 +85,9 @@ def test_invalid_effects_return_error():
     assert check_effects(scene, scene[Effects].tables) == ""
 
 
-def test_every_effect_of_catalogue_is_listed(monkeypatch):
-    """Flights and costs are synthetic; effects that cannot be flown have a remark."""
+@pytest.fixture
+def synthetic_flights(monkeypatch):
+    """Flights and costs of variants without a simulation."""
 
     class Same:
         def fly(self, variants):
@@ -94,6 +95,19 @@ def test_every_effect_of_catalogue_is_listed(monkeypatch):
 
     monkeypatch.setattr(procedure, "variant_pool", lambda scene: contextlib.nullcontext(Same()))
     monkeypatch.setattr(procedure, "costs", lambda scene, variants: [Cost(1.0, 1.0, 0.1, 0.1)] * len(variants))
+
+
+@pytest.mark.usefixtures("synthetic_flights")
+def test_selected_effects_are_studied_alone():
+    rows = run_study(load(HOVER), 0.01, lambda *_: None, ["gravity", "body_drag", "collision"]).rows
+    assert [(row.name, row.active) for row in rows] == [("gravity", True), ("body_drag", False), ("collision", False)]
+    with pytest.raises(ValueError, match="unknown effect 'bodydrag'; did you mean body_drag"):
+        run_study(load(HOVER), 0.01, lambda *_: None, ["bodydrag"])
+
+
+@pytest.mark.usefixtures("synthetic_flights")
+def test_every_effect_of_catalogue_is_listed():
+    """Effects that cannot be flown have a remark."""
     result = run_study(load(HOVER), 0.01, lambda *_: None)
     rows = {row.name: row for row in result.rows}
     assert sorted(rows) == effects.names()
