@@ -83,7 +83,7 @@ def test_timeline_shows_each_span_of_saturation_with_its_share():
     voltage = np.full((TICKS, 4), 20.0)
     voltage[120:130, 0] = voltage[300:330, 2] = 40.0
     marks = [mark for mark in timeline.draw(flown(voltage)).panels[0].marks if mark.lane == "motor limit"]
-    assert [(mark.start, mark.end, mark.text) for mark in marks] == [
+    assert [(round(mark.start, 9), round(mark.end, 9), mark.text) for mark in marks] == [
         (1.2, 1.3, "motor 1 at 40 V for 0.10 s, 3.3 % of the time in the air"),
         (3.0, 3.3, "motor 3 at 40 V for 0.30 s, 10 % of the time in the air"),
     ]
