@@ -100,9 +100,7 @@ def main() -> None:
 
 def _usage_text(error: typer.BadParameter) -> str:
     """Return the fault of a command line, with the value that typer leaves out."""
-    details = getattr(
-        error.__cause__, "errors", list
-    )()  # of pydantic, which converts values in newer versions of typer
+    details: list = getattr(error.__cause__, "errors", list)()  # of pydantic, in newer versions of typer
     parameter = getattr(error, "param", None)
     if not details or parameter is None:
         return error.format_message()
