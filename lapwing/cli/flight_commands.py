@@ -146,17 +146,18 @@ def import_(
 ) -> None:
     """Convert a recorded flight from an autopilot into a log.
 
-    Formats: ULog (.ulg), dataflash (.bin, .log), MAVLink telemetry (.tlog), rosbag2 folders, logs of the Crazyflie's
-    uSD deck, and CSV files (.csv, .csv.gz) with --mapping.
+    Formats: ULog (.ulg), dataflash (.bin, .log), MAVLink telemetry (.tlog), rosbag2 folders and files (.mcap, .db3),
+    logs of the Crazyflie's uSD deck, and CSV files (.csv, .csv.gz) with --mapping.
     """
+    from lapwing.studies.flight_import.log_flight import is_log
     from lapwing.studies.flight_import.open_flight import open_flight
     from lapwing.studies.flight_import.write_log import write_log
 
     check_distinct({"FLIGHT": flight, "--out": out})
     if out.suffix != ".mcap":
         raise ValueError(f"--out {out}: expected a name that ends in .mcap")
-    if flight.suffix == ".mcap":
-        raise ValueError(f"{flight}: is a log already; for a file of a rosbag2, use its folder with metadata.yaml")
+    if flight.suffix == ".mcap" and flight.is_file() and is_log(flight):
+        raise ValueError(f"{flight}: is a Lapwing log already; use it without import, e.g. lapwing report {flight}")
     recording = open_flight(flight, mapping, vehicle)
     if not recording.valid.any():
         raise ValueError(f"{flight}: no valid sample; check the --mapping")

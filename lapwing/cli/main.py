@@ -95,7 +95,18 @@ def main() -> None:
                 app(sys.argv[1:] or ["--help"], prog_name="lapwing", standalone_mode=False)
         except UsageError as error:
             command = error.ctx.command_path if error.ctx else "lapwing"
-            fail(f"{error.format_message()} (see {command} --help)", USER_ERROR)
+            fail(f"{_usage_text(error)} (see {command} --help)", USER_ERROR)
+
+
+def _usage_text(error: typer.BadParameter) -> str:
+    """Return the fault of a command line, with the value that typer leaves out."""
+    details: list = getattr(error.__cause__, "errors", list)()  # of pydantic, in newer versions of typer
+    parameter = getattr(error, "param", None)
+    if not details or parameter is None:
+        return error.format_message()
+    name = parameter.opts[0] if parameter.opts[0].startswith("-") else parameter.human_readable_name
+    expected = str(details[0]["msg"]).replace("Input should be", "expected").partition(", unable to parse")[0]
+    return f"{name} {details[0]['input']}: {expected}"
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from lapwing.services.common import ports, status_texts
 from lapwing.services.common.event_kinds import KINDS
 from lapwing.studies.ground_contacts import ground_contacts
 from lapwing.studies.model_validity import validity_warnings
-from lapwing.studies.saturation import intervals, saturation
+from lapwing.studies.saturation import description, intervals, saturation
 from lapwing.studies.tension import link_tension, pushes
 from lapwing.studies.topic_view import TopicView
 
@@ -158,12 +158,7 @@ def _saturation(truth: TopicView, armed: np.ndarray, highest: float) -> Iterator
     times = intervals(result.any, t)
     if not times:
         return
-    low, high = (np.flatnonzero(at.any(axis=0)) + 1 for at in (result.low, result.high))
-    where = [f"{_motors(low)} at 0 V"] * bool(len(low)) + [f"{_motors(high)} at {highest:g} V"] * bool(len(high))
     count = f" ({len(times)} times)" if len(times) > 1 else ""
     share = f"{100.0 * result.share(result.lasted):.2g} % of the time in the air"
-    yield Event(float(t[times[0][0]]), "motors", f"{', '.join(where)} for {result.lasted:.2f} s{count}, {share}")
-
-
-def _motors(numbers: np.ndarray) -> str:
-    return f"motor{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))}"
+    where = description(result.low, result.high, highest)
+    yield Event(float(t[times[0][0]]), "motors", f"{where} for {result.lasted:.2f} s{count}, {share}")

@@ -67,6 +67,29 @@ def _limits(low: Any, high: Any, voltage: Any, flying: Any, least: float, most: 
             high[row, k] = flying[row] and voltage[row, k] > most
 
 
+def description(low: np.ndarray, high: np.ndarray, highest: float) -> str:
+    """Return a text of the motors at each limit, given their flags, shape (n, motors): "motor 2 at 40 V"."""
+    limits = ((low, "0 V"), (high, f"{highest:g} V"))
+    parts = [f"{_motors(np.flatnonzero(at.any(axis=0)) + 1)} at {limit}" for at, limit in limits if at.any()]
+    return ", ".join(parts)
+
+
+def spans(result: Saturation, t: np.ndarray, highest: float) -> list[tuple[str, float, float]]:
+    """Return each interval with a motor at a limit: its text with time and share, start and end [s]."""
+    listed, at_limit = [], result.any
+    for start, stop in intervals(at_limit, t):
+        rows = slice(start, stop)
+        lasted = float(result.step[rows][at_limit[rows]].sum())
+        motors = description(result.low[rows], result.high[rows], highest)
+        text = f"{motors} for {lasted:.2f} s, {100.0 * result.share(lasted):.2g} % of the time in the air"
+        listed.append((text, float(t[start]), float(t[min(stop, len(t) - 1)])))
+    return listed
+
+
+def _motors(numbers: np.ndarray) -> str:
+    return f"motor{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))}"
+
+
 def intervals(where: np.ndarray, t: np.ndarray) -> list[tuple[int, int]]:
     """Return the rows (first, stop) of the intervals where `where` is True; gaps shorter than GAP are closed."""
     edges = np.diff(where.astype(np.int8), prepend=0, append=0)

@@ -89,7 +89,7 @@ def method(scene: Scene) -> tuple[tuple, int, float]:
     """
     solver, exchange = scene[Solver], scene[Communication]
     if solver.undecided:
-        message = "no solver is selected; pass that of `lapwing run`: --set solver.integrator=... --set solver.step=..."
+        message = "no solver is selected; override solver.integrator and solver.step with those of `lapwing run`"
         raise SceneError("solver.accuracy", message, source=KeyOrigin(scene.path))
     steps = solver.steps(exchange)
     return integrators.get(solver.integrator).Method(), steps, exchange.interval / steps

@@ -106,7 +106,7 @@ def test_invalid_controller_is_one_line_scene_error(controller, text):
     with pytest.raises(lapwing.SceneError) as caught:
         lapwing.fly("hover", controller=controller)
     line = str(caught.value)
-    assert line.startswith("--set autopilot.controller: ")
+    assert line.startswith("override autopilot.controller: ")
     assert text in line
     assert "\n" not in line
 

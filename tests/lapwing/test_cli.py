@@ -20,9 +20,9 @@ PEERS = "plant=tcp/127.0.0.1:7001,autopilot=tcp/127.0.0.1:7002"
 OPEN = ("--endpoints", "foxglove=unixsock-stream/x")
 
 BAD = {
-    "unknown key": ([HOVER, "--set", "run.sed=1"], "--set run.sed: unknown key 'sed'; did you mean seed?"),
+    "unknown key": ([HOVER, "--set", "run.sed=1"], "override run.sed: unknown key 'sed'; did you mean seed?"),
     "unknown table": ([HOVER, "--set", "runn.seed=1"], "unknown table 'runn'; did you mean run?"),
-    "wrong type": ([HOVER, "--set", "run.seed=x"], "--set run.seed: expected a whole number at least 0 and"),
+    "wrong type": ([HOVER, "--set", "run.seed=x"], "override run.seed: expected a whole number at least 0 and"),
     "negative rate": (
         [HOVER, "--set", "communication.rate=-250"],
         "communication.rate: expected a whole number above 0 and",
@@ -37,7 +37,8 @@ BAD = {
     "gain set": ([HOVER, "--set", "autopilot.gains=x"], "unknown gain set 'x'; expected one of"),
     "sensor": ([DELIVERY, "--set", "sensors.imuu={}"], "unknown sensor 'imuu'; did you mean imu? expected"),
     "preset": ([DELIVERY, "--set", "sensors.imu.preset=x"], "unknown preset 'x'; expected one of"),
-    "list": ([HOVER, "--set", 'success.require="time"'], "--set success.require: expected a list, got 'time'"),
+    "no number": ([HOVER, "--run", "abc"], "--run abc: expected a valid integer (see lapwing run --help)"),
+    "list": ([HOVER, "--set", 'success.require="time"'], "override success.require: expected a list, got 'time'"),
     "success": ([HOVER, "--set", 'success.require=["tim < 3"]'], "unknown figure 'tim'; did you mean time?"),
     "no condition": ([HOVER, "--set", 'success.require=["rmse.z"]'], "'rmse.z' is a number, not true or false"),
     "unlike types": ([HOVER, "--set", "success.require=[\"'a' < 1\"]"], "is a text, '1' is a number"),
@@ -45,7 +46,7 @@ BAD = {
     "no expression": ([HOVER, "--set", 'success.require=["exit()"]'], "expected an expression over metrics of the"),
     "run alone": ([HOVER, "--run", "3"], "--run and --campaign: belong together; expected both"),
     "no campaign": ([HOVER, "--run", "3", "--campaign", "scenes"], "scenes: not a campaign; expected a folder"),
-    "no value": ([HOVER, "--set", "run.seed"], "--set run.seed: expected KEY=VALUE"),
+    "no value": ([HOVER, "--set", "run.seed"], "override run.seed: expected KEY=VALUE"),
     "two lines": ([HOVER, "--set", 'run.title="a\nb'], "is not a TOML value"),
     "index": ([HOVER, "--set", "trajectory.phase.9.duration=1"], "expected an index from 0 to 3, got 9"),
     "missing file": (

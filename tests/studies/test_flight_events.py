@@ -3,6 +3,8 @@
 import numpy as np
 import synthetic_flights
 
+from lapwing.studies.report.plots import timeline
+
 TICKS, RATE = 500, 100
 T = np.arange(TICKS) / RATE
 SCENE = {
@@ -75,3 +77,13 @@ def test_saturation_is_one_event_with_its_share():
     (event,) = [event for event in flown(voltage).events if event.kind == "motors"]
     assert event.time == 1.2
     assert event.text == "motors 1, 3 at 40 V for 0.40 s (2 times), 13 % of the time in the air"
+
+
+def test_timeline_shows_each_span_of_saturation_with_its_share():
+    voltage = np.full((TICKS, 4), 20.0)
+    voltage[120:130, 0] = voltage[300:330, 2] = 40.0
+    marks = [mark for mark in timeline.draw(flown(voltage)).panels[0].marks if mark.lane == "motor limit"]
+    assert [(round(mark.start, 9), round(mark.end, 9), mark.text) for mark in marks] == [
+        (1.2, 1.3, "motor 1 at 40 V for 0.10 s, 3.3 % of the time in the air"),
+        (3.0, 3.3, "motor 3 at 40 V for 0.30 s, 10 % of the time in the air"),
+    ]

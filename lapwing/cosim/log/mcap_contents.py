@@ -55,6 +55,10 @@ class ChunkInfo(NamedTuple):
         return not self.channels or not self.channels.isdisjoint(channels)
 
 
+class UnchunkedError(ValueError):
+    """File with messages outside of chunks, which Lapwing does not write."""
+
+
 class Contents:
     """Contents of a file.
 
@@ -128,7 +132,7 @@ class Contents:
         file = self._file
         size = os.fstat(file.fileno()).st_size
         if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-            raise ValueError(f"{self._path}: not an MCAP file")
+            raise ValueError(f"{self._path}: {'not an MCAP file' if size else 'is empty; expected a log (MCAP)'}")
         offset, unpacked = len(MCAP0_MAGIC), 0
         while offset + _RECORD.size <= size:
             opcode, length = _RECORD.unpack(file.read(_RECORD.size))
@@ -147,7 +151,7 @@ class Contents:
             elif opcode == Opcode.MESSAGE_INDEX and self.chunks:
                 self.chunks[-1].channels.add(*_CHANNEL.unpack(file.read(_CHANNEL.size)))
             elif opcode == Opcode.MESSAGE:
-                raise ValueError(f"{self._path}: has messages outside of chunks; expected a chunked log")
+                raise UnchunkedError(f"{self._path}: has messages outside of chunks; expected a chunked log")
             elif opcode in _DECLARATIONS:
                 self._declare(opcode, file.read(length))
             offset += _RECORD.size + length

@@ -12,7 +12,7 @@ class KeyOrigin(NamedTuple):
     path: Path | None = None
     line: int | None = None
     override: str | None = None  # its key, or its full text if it is not KEY=VALUE or has no effect
-    option: str = "--set"  # option of the override
+    option: str = "override"  # what names the override in messages, e.g. a command-line option
 
     def __str__(self) -> str:
         if self.override is not None:

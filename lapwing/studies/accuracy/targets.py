@@ -30,5 +30,5 @@ def scene_of(target: str, overrides: Iterable[str]) -> Scene | None:
     if target.endswith(".toml") or shipped:
         return load(Path(target), overrides)
     if overrides := list(overrides):
-        raise ValueError(f"--set {overrides[0]}: {target} is not a scene; use --set with a scene")
+        raise ValueError(f"override {overrides[0]}: {target} is not a scene; use overrides with a scene")
     return None

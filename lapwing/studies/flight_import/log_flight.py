@@ -5,6 +5,8 @@ from typing import Any
 
 import numpy as np
 
+from lapwing.cosim.log.log_reader import LogReader
+from lapwing.cosim.log.mcap_contents import UnchunkedError
 from lapwing.messages.topics import ACTUATORS, BARO, GPS, IMU, MAG, SETPOINT, TRUTH
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_import.recording import SETPOINT_WIDTH, Recording, Series
@@ -17,6 +19,15 @@ READINGS = {  # name without the vehicle's, and fields, of each sensor's topic
     "baro": ("baro", ("fluid_pressure",)),
     "mag": ("mag", ("magnetic_field",)),
 }
+
+
+def is_log(path: Path) -> bool:
+    """Return True if an MCAP file is a Lapwing log. Raise ValueError if it cannot be read."""
+    try:
+        with LogReader(path) as log:
+            return bool(log.metadata)
+    except UnchunkedError:
+        return False
 
 
 def read_log_flight(path: Path) -> Recording:

@@ -7,14 +7,16 @@ from lapwing.studies.flight_import.column_mapping import load_mapping
 from lapwing.studies.flight_import.recording import Recording
 
 USD_MAPPING = "crazyflie_usd"
-FORMATS = ".ulg, .bin, .log, .tlog, .mcap, a rosbag2 folder, .csv and .csv.gz with --mapping, or a log of the Crazyflie"
+FORMATS = (
+    ".ulg, .bin, .log, .tlog, .mcap, .db3, a rosbag2 folder, .csv and .csv.gz with --mapping, or a log of the Crazyflie"
+)
 
 
 def open_flight(path: Path, mapping: str | None = None, vehicle: str | None = None) -> Recording:
     """Read a flight, and note if it never leaves the ground. The file name's extension selects one of `FORMATS`.
 
     Args:
-        path: path of the file, or of the folder of a rosbag2.
+        path: path of the file, or of the folder or a single file of a rosbag2.
         mapping: name or file of the columns' mapping, for CSV files and logs of the Crazyflie.
         vehicle: namespace of the vehicle in a rosbag2.
 
@@ -31,12 +33,12 @@ def open_flight(path: Path, mapping: str | None = None, vehicle: str | None = No
 def _read(path: Path, mapping: str | None, vehicle: str | None) -> Recording:
     from lapwing.studies.flight_import import csv_flight, usd_log
 
-    if path.is_dir():
+    if _is_rosbag(path):
         from lapwing.studies.flight_import.rosbag_flight import read_rosbag_flight
 
         return read_rosbag_flight(path, vehicle)
     if vehicle is not None:
-        raise ValueError(f"--vehicle {vehicle}: {path} is not a rosbag2 folder; omit the option")
+        raise ValueError(f"--vehicle {vehicle}: {path} is not a rosbag2; omit the option")
     if not path.is_file():
         message = "is not a regular file" if path.exists() else "no such file"
         raise ValueError(f"{path}: {message}; use the path of a recorded flight")
@@ -66,3 +68,11 @@ def _read(path: Path, mapping: str | None, vehicle: str | None) -> Recording:
     if usd_log.is_usd_log(path):
         return csv_flight.from_columns(path, usd_log.read_usd_log(path), load_mapping(mapping or USD_MAPPING))
     raise ValueError(f"{path}: unknown format; expected {FORMATS}")
+
+
+def _is_rosbag(path: Path) -> bool:
+    if path.suffix.lower() == ".mcap" and path.is_file():
+        from lapwing.studies.flight_import.log_flight import is_log
+
+        return not is_log(path)
+    return path.is_dir() or (path.suffix.lower() == ".db3" and path.is_file())

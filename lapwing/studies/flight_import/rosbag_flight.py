@@ -1,4 +1,4 @@
-"""Recordings from rosbag2 folders (SQLite or MCAP), read by rosbags.
+"""Recordings from rosbag2 folders or single files (SQLite or MCAP), read by rosbags.
 
 Messages are selected by type: those of ROS (ENU, FLU; REP 103), MAVROS, and PX4 (NED, FRD). Of several topics of one
 type, the one with most messages is used. A bag with the motors of several vehicles needs the name of one: the first
@@ -54,18 +54,19 @@ FIELDS: dict[str, Callable[[Any], Any]] = {  # values of each message by type
 }
 
 MOTORS = ("px4_msgs/msg/ActuatorMotors", "actuator_msgs/msg/Actuators", RC_OUT)
+_EXPECTED = ("a file of messages of ROS 2", "a folder with metadata.yaml and its messages")
 POSES = ("nav_msgs/msg/Odometry", "geometry_msgs/msg/PoseStamped")
 
 
 def read_rosbag_flight(path: Path, vehicle: str | None = None) -> Recording:
-    """Read a rosbag2 folder.
+    """Read a rosbag2.
 
     Args:
-        path: path of the folder.
+        path: path of the folder, or of a file with the ending .mcap or .db3.
         vehicle: namespace of the vehicle, required if the bag has the motors of several.
 
     Raises:
-        ValueError: rosbags is not installed, the folder is not a rosbag2, a required message is missing, or the
+        ValueError: rosbags is not installed, the path is not a rosbag2, a required message is missing, or the
             vehicle is ambiguous or unknown.
     """
     series, unknown = _series(path, vehicle)
@@ -141,7 +142,7 @@ def _series(path: Path, vehicle: str | None) -> tuple[dict[str, Series], tuple[s
     except RowLengthError:
         raise ValueError(f"{path}: a topic's arrays change their length; record the flight again") from None
     except Exception:  # rosbags raises exceptions of many types
-        raise ValueError(f"{path}: is not a readable rosbag2 folder; expected metadata.yaml and its messages") from None
+        raise ValueError(f"{path}: is not a readable rosbag2; expected {_EXPECTED[path.is_dir()]}") from None
     tables = {kind: numbers.to_array() for kind, numbers in rows.items()}
     return {kind: Series.of(table[:, 0], table[:, 1:]) for kind, table in tables.items() if table.shape[1] > 1}, tuple(
         unknown

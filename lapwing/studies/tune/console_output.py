@@ -22,12 +22,27 @@ UNITS = {
     "lag": "s",
 }
 
+_MARGINS = (
+    "Inner loops (roll, pitch) follow a tilt, outer ones (x, y) a position; at the plant input, both act at once. "
+    "Crossover: highest frequency at which the loop's gain is 1; the loop follows slower motion. Phase margin: extra "
+    "lag that the loop bears. Gain margin and reduction: increase and decrease of the gain that it bears."
+)
+_ERRORS = (
+    "RMSE: root-mean-square error against the reference. Designed: gains from the linear model. Refined: the best of "
+    "the gain sets flown."
+)
+_CORNERS = "The true mass, inertia and thrust differ from the controller's by these shares, all at once."
+_MODEL = (
+    "Acceleration per force that the controller demands of every rotor. Lag: time constant of the rotors' speed. "
+    "Spin-up zero: torque that spins a rotor up, over that of its drag, per unit rate of its speed."
+)
+
 
 class Rows:
     """Table of texts with title, column heads and rows; the first cell of a row is its name."""
 
-    def __init__(self, title: str, *heads: str):
-        self.title, self.heads = title, heads
+    def __init__(self, title: str, *heads: str, caption: str = ""):
+        self.title, self.heads, self.caption = title, heads, caption
         self.rows: list[tuple[str, ...]] = []
         self.failed: set[int] = set()  # indices of rows with a failure
 
@@ -70,7 +85,7 @@ def cells(m: Margins) -> tuple[str, ...]:
 
 def _margins(tuning: Tuning) -> Rows:
     heads = ("loop", "gains", "crossover, rad/s", "phase margin, °", "gain margin, dB", "reduction, dB")
-    rows = Rows("Margins of the loops before and after", *heads)
+    rows = Rows("Margins of the loops before and after", *heads, caption=_MARGINS)
     for name in tuning.after.margins:
         for review in (tuning.before, tuning.after):
             failed = review is tuning.after and name in review.shortfalls
@@ -82,7 +97,7 @@ def _errors(tuning: Tuning) -> Rows:
     p = tuning.refinement
     assert p is not None
     title = f"RMSE of {len(p.after)} flights of the scene, designed and refined ({p.candidates} gain sets flown)"
-    rows = Rows(title, "axis", "designed", "refined")
+    rows = Rows(title, "axis", "designed", "refined", caption=_ERRORS)
     for axis in AXES:
         unit, scale = unit_and_factor(axis)
         rows.add(f"{axis} [{unit}]", f"{scale * rmse(p.before, axis):.4f}", f"{scale * rmse(p.after, axis):.4f}")
@@ -91,8 +106,9 @@ def _errors(tuning: Tuning) -> Rows:
 
 def _corners(tuning: Tuning) -> Rows:
     rows = Rows(
-        "Flights of vehicles that differ from the controller's model", "vehicle", "max. position error, m", "outcome"
-    )
+        "Flights of vehicles that differ from the controller's model", "vehicle", "max. position error, m", "outcome",
+        caption=_CORNERS,
+    )  # fmt: skip
     for corner, f in tuning.corners.items():
         rows.add(str(corner), f"{f['max_distance']:.3f}", f["outcome"], failed=bool(failure(f)))
     return rows
@@ -100,13 +116,14 @@ def _corners(tuning: Tuning) -> Rows:
 
 def _model(tuning: Tuning) -> Rows:
     if tuning.identification is None:
-        rows = Rows("Plant about hover, from the compiled model", "effect", "value", "unit")
+        rows = Rows("Plant about hover, from the compiled model", "effect", "value", "unit", caption=_MODEL)
         for name, unit in UNITS.items():
             rows.add(name, f"{getattr(tuning.compiled_model, name):.4g}", unit)
         return rows
     rows = Rows(
-        "Plant about hover, identified from the log", "effect", "identified", "compiled model", "unit", "fit, %"
-    )
+        "Plant about hover, identified from the log", "effect", "identified", "compiled model", "unit", "fit, %",
+        caption=f"{_MODEL} Fit: share of the variation in the log that the identified model explains.",
+    )  # fmt: skip
     for name, unit in UNITS.items():
         a, b = getattr(tuning.identification.model, name), getattr(tuning.compiled_model, name)
         fit = f"{tuning.identification.fit[name]:.1f}" if name in LOOPS else ""

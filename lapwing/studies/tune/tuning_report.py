@@ -53,13 +53,13 @@ def _outcome(tuning: Tuning) -> str:
 
 
 _BODE = (
-    "From the error to the response, with the motors' lag and the sampling delay. Dots mark the crossover, where the "
-    "gain is one; the phase margin is the distance of the phase from -180 degrees there. Drag an axis to see gains "
-    "outside 0.001 to 1000 and phases outside -360 to -30 degrees."
+    "From the error to the response, with the motors' lag and the sampling delay. Dashed: gains before; solid: new "
+    "gains. Dots mark the crossover, where the gain is one; the phase margin is the distance of the phase from -180 "
+    "degrees there. Drag an axis to see gains outside 0.001 to 1000 and phases outside -360 to -30 degrees."
 )
 _STEPS = (
     "Response of the linear model about hover to a unit step, without feed-forward. Above the curves: rise time from "
-    "10 to 90 %, and overshoot."
+    "10 to 90 % of the step, and overshoot: how far the response exceeds it."
 )
 
 

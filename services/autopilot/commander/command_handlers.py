@@ -70,7 +70,7 @@ def arm(context: Context, command: Any) -> None:
             context.outbox.acknowledge(command, CommandAck.IN_PROGRESS, blockers[0])
             return
         if value(command.values, 0) != 1.0:
-            raise ValueError(f"arming refused: {'; '.join(blockers)}")
+            raise ValueError(f"Arming denied: {'; '.join(blockers)}")
     transitions.arm(context)
 
 
@@ -81,7 +81,7 @@ def disarm(context: Context, command: Any) -> None:
     if not state.guidance.armed:
         return
     if state.guidance.flying and value(command.values, 0) != 1.0:
-        raise ValueError("disarming refused: the vehicle flies")
+        raise ValueError("Disarming denied: not landed")  # the words of PX4
     if state.on_trajectory:
         transitions.enter(context.constants, state, "hold")
     transitions.disarm(context, status_texts.AS_COMMANDED)
@@ -104,7 +104,7 @@ def mission_start(context: Context, command: Any) -> None:
     transitions.enter(context.constants, context.state, "mission", *command.values[:1])
     if not context.state.guidance.armed and (blockers := prearm_checks.arming_blockers(context.view, context.state)):
         context.state.mode, context.state.mode_name = before
-        raise ValueError(f"arming refused: {'; '.join(blockers)}")
+        raise ValueError(f"Arming denied: {'; '.join(blockers)}")
     if not context.state.guidance.armed:
         transitions.arm(context)
     context.state.failsafe = ""

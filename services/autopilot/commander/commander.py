@@ -161,6 +161,7 @@ def _retry_arming(context: Context) -> None:
     elif time_left < view.dt:
         state.pending_arm = None
         outbox.acknowledge(command, CommandAck.TEMPORARILY_REJECTED, blockers[0])
+        outbox.send_text(f"Arming denied: {'; '.join(blockers)}")
     else:
         state.pending_arm = state.pending_arm._replace(time_left=time_left - view.dt)
 

@@ -37,6 +37,10 @@ class Reply(NamedTuple):
     messages: list[Any]
 
 
+class DeniedError(Exception):
+    """Refusal of a command for a reason other than invalid parameters; its text is for the operator."""
+
+
 Outcome = Request | Reply | int  # int: MAV_RESULT
 Rule = Callable[[Session, Command], Outcome]
 
@@ -84,11 +88,17 @@ def execute(session: Session, command: Command) -> None:
         if session.endpoint.last_heartbeat is None:
             session.send_text("command rejected: send a HEARTBEAT first")
     else:
+        name = mavlink.enums["MAV_CMD"][command.number].name.removeprefix("MAV_CMD_")
+        reason = f"{name}: denied, invalid parameters"
         try:
             outcome = function(session, command)
+        except DeniedError as error:
+            outcome, reason = DENIED, str(error)
         except (ValueError, OverflowError):  # an invalid position, a non-finite number
             outcome = DENIED
             session.count("invalid command")
+        if outcome == DENIED and command.number not in READ_ONLY:
+            session.send_text(reason)
 
     def acknowledge(result: int, progress: int = NO_PROGRESS) -> None:
         session.send(mavlink.MAVLink_command_ack_message(command.number, result, progress, 0, *session.address))

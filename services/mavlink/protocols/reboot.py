@@ -1,7 +1,7 @@
 """MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN."""
 
 from lapwing.services.common.mavlink.dialect import mavlink
-from lapwing.services.mavlink.protocols.commands import ACCEPTED, DENIED, Command, Outcome, rule
+from lapwing.services.mavlink.protocols.commands import ACCEPTED, DENIED, Command, DeniedError, Outcome, rule
 from lapwing.services.mavlink.session import Session
 
 NOTHING, REBOOT = 0, 1  # action on the autopilot
@@ -14,4 +14,6 @@ def reboot(session: Session, c: Command) -> Outcome:
     if action == REBOOT and not session.vehicle.status.armed:
         session.restart()
         return ACCEPTED
+    if action == REBOOT:
+        raise DeniedError("Reboot denied: disarm first")
     return ACCEPTED if action == NOTHING else DENIED

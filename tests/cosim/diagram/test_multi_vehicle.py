@@ -153,21 +153,21 @@ def test_topics_of_vehicle_of_fleet():
 
 
 WRONG = {
-    "vehicle.7.name=x": "--set vehicle.7.name=x: no such vehicle; expected vehicle.N.name, N from 0 to 2",
+    "vehicle.7.name=x": "override vehicle.7.name=x: no such vehicle; expected vehicle.N.name, N from 0 to 2",
     "vehicle.left.initial_position=[0,0]": (
-        "--set vehicle.left.initial_position=[0,0]: no such vehicle; expected vehicle.N.initial_position, N from 0 to 2"
+        "override vehicle.left.initial_position=[0,0]: no such vehicle; expected vehicle.N.initial_position, N"
     ),
     "vehicle.left.airframe.mass.total=3": (
-        "--set vehicle.left.airframe.mass.total=3: no such vehicle; expected vehicle.N.airframe.mass.total, N from"
+        "override vehicle.left.airframe.mass.total=3: no such vehicle; expected vehicle.N.airframe.mass.total, N from"
     ),
-    "vehicle.name=x": "--set vehicle.name=x: no such vehicle; expected vehicle.N.name, N from 0 to 2",
-    "vehicle.1.run.seed=3": "--set vehicle.1.run.seed: all vehicles share this table; expected a table [run]",
-    "vehicle.1.name=left": "--set vehicle.1.name: left is already used by vehicle.0; expected another value",
-    "vehicle.1.mavlink.system_id=1": "--set vehicle.1.mavlink.system_id: 1 is already used by vehicle.0",
-    "vehicle.2.autopilot.gains=x": "--set vehicle.2.autopilot.gains: unknown gain set 'x'",
-    "vehicle.0.nam=3": "--set vehicle.0.nam: unknown key 'nam'; did you mean name?",
-    "vehicle.0.airframe.mass.total=-3": "--set vehicle.0.airframe.mass.total: expected a number above 0 [kg], got -3",
-    "autopilot.gains=x": "--set autopilot.gains: unknown gain set 'x'",
+    "vehicle.name=x": "override vehicle.name=x: no such vehicle; expected vehicle.N.name, N from 0 to 2",
+    "vehicle.1.run.seed=3": "override vehicle.1.run.seed: all vehicles share this table; expected a table [run]",
+    "vehicle.1.name=left": "override vehicle.1.name: left is already used by vehicle.0; expected another value",
+    "vehicle.1.mavlink.system_id=1": "override vehicle.1.mavlink.system_id: 1 is already used by vehicle.0",
+    "vehicle.2.autopilot.gains=x": "override vehicle.2.autopilot.gains: unknown gain set 'x'",
+    "vehicle.0.nam=3": "override vehicle.0.nam: unknown key 'nam'; did you mean name?",
+    "vehicle.0.airframe.mass.total=-3": "override vehicle.0.airframe.mass.total: expected a number above 0 [kg]",
+    "autopilot.gains=x": "override autopilot.gains: unknown gain set 'x'",
 }
 
 

@@ -83,7 +83,7 @@ def test_fault_is_value(write):
     assert fault.source[:3] == (path, line(text, "duration = -1"), None)
     fault = refused(HOVER, "run.seed=1.5")
     assert (fault.key, fault.message) == ("run.seed", "got 1.5")
-    assert fault.source == (None, None, "run.seed", "--set")
+    assert fault.source == (None, None, "run.seed", "override")
     assert str(pickle.loads(pickle.dumps(fault))) == str(fault)
 
 
@@ -104,35 +104,44 @@ def test_choices_are_listed():
 @pytest.mark.parametrize(
     ("override", "expected"),
     [
-        ("run.seed", "--set run.seed: expected KEY=VALUE, for example solver.step=0.001"),
-        ("=3", "--set =3: expected KEY=VALUE"),
-        ("run.seed=", "--set run.seed=: expected KEY=VALUE"),
-        ("run.seed=[1", "--set run.seed=[1: [1 is not a TOML value; quote a text"),
-        ("run.seed.x=3", "--set run.seed.x=3: run.seed is a value, not a table"),
-        ("vehicle.airframe.x=3", "--set vehicle.airframe.x=3: vehicle.airframe is a value, not a table"),
-        ("run.seed=1.5", "--set run.seed: expected a whole number at least 0 and below 9.22337e+18, got 1.5"),
-        ("run.duration=nan", "--set run.duration: expected a finite number, got nan"),
-        ("run=3", "--set run: expected a table [run], got 3"),
-        ("effects.gravity=3", "--set effects.gravity: expected a table [effects.gravity], got 3"),
-        ("vehicle.name=1x", "--set vehicle.name: expected a text of the form"),
-        ("communication.rate=300", "--set communication.rate: expected a rate with a whole number of ns"),
-        ("rates.pose=33", "--set rates.pose: expected a rate that divides communication.rate = 250 Hz (250, 125, 50"),
-        ("solver.step=0.003", "--set solver.step: expected a step that divides the communication step of 0.004 s"),
-        ("published.rmse.q=3", "--set published.rmse.q: expected 'x', 'y'"),
-        ("trajectory.phase=[]", "--set trajectory.phase: expected at least 1"),
-        ("trajectory.phase.9.duration=1", "--set trajectory.phase.9.duration=1: expected an index from 0 to 3, got 9"),
+        ("run.seed", "override run.seed: expected KEY=VALUE, for example solver.step=0.001"),
+        ("=3", "override =3: expected KEY=VALUE"),
+        ("run.seed=", "override run.seed=: expected KEY=VALUE"),
+        ("run.seed=[1", "override run.seed=[1: [1 is not a TOML value; quote a text"),
+        ("run.seed.x=3", "override run.seed.x=3: run.seed is a value, not a table"),
+        ("vehicle.airframe.x=3", "override vehicle.airframe.x=3: vehicle.airframe is a value, not a table"),
+        ("run.seed=1.5", "override run.seed: expected a whole number at least 0 and below 9.22337e+18, got 1.5"),
+        ("run.duration=nan", "override run.duration: expected a finite number, got nan"),
+        ("run=3", "override run: expected a table [run], got 3"),
+        ("effects.gravity=3", "override effects.gravity: expected a table [effects.gravity], got 3"),
+        ("vehicle.name=1x", "override vehicle.name: expected a text of the form"),
+        ("communication.rate=300", "override communication.rate: expected a rate with a whole number of ns"),
+        (
+            "rates.pose=33",
+            "override rates.pose: expected a rate that divides communication.rate = 250 Hz (250, 125, 50",
+        ),
+        ("solver.step=0.003", "override solver.step: expected a step that divides the communication step of 0.004 s"),
+        ("published.rmse.q=3", "override published.rmse.q: expected 'x', 'y'"),
+        ("trajectory.phase=[]", "override trajectory.phase: expected at least 1"),
+        (
+            "trajectory.phase.9.duration=1",
+            "override trajectory.phase.9.duration=1: expected an index from 0 to 3, got 9",
+        ),
         ("trajectory.phase.x.duration=1", "expected an index from 0 to 3, got x"),
-        ("gains.altitude.3=1", "--set gains.altitude.3=1: expected an index from 0 to 2, got 3"),
+        ("gains.altitude.3=1", "override gains.altitude.3=1: expected an index from 0 to 2, got 3"),
         ("trajectory.phase.1.name=climb", "two phases are named 'climb'"),
-        ("airframe.mass.total=-1", "--set airframe.mass.total: expected a number above 0 [kg], got -1"),
-        ("airframe.mass.payload=11", "--set airframe.mass.payload: expected less than total = 10.0224 kg, got 11"),
-        ("airframe.mass.totl=1", "--set airframe.mass.totl: unknown key 'totl'; did you mean total?"),
-        ("gains.altitude=[1, 2]", "--set gains.altitude.2: missing; expected a number"),
-        ("gains.tilt_limit=1.5", "--set gains.tilt_limit: expected a number above 0 and below 1.4 [rad], got 1.5"),
-        ("autopilot.parameters=none.params", "--set autopilot.parameters: lapwing/scenes/none.params: no such file"),
+        ("airframe.mass.total=-1", "override airframe.mass.total: expected a number above 0 [kg], got -1"),
+        ("airframe.mass.payload=11", "override airframe.mass.payload: expected less than total = 10.0224 kg, got 11"),
+        ("airframe.mass.totl=1", "override airframe.mass.totl: unknown key 'totl'; did you mean total?"),
+        ("gains.altitude=[1, 2]", "override gains.altitude.2: missing; expected a number"),
+        ("gains.tilt_limit=1.5", "override gains.tilt_limit: expected a number above 0 and below 1.4 [rad], got 1.5"),
+        ("autopilot.parameters=none.params", "override autopilot.parameters: lapwing/scenes/none.params: no such file"),
         ("autopilot.parameters.MPC_TKO_SPEED=9", "MPC_TKO_SPEED: expected a number from 0.1 to 5, got 9"),
-        ("autopilot.estimator=kalman", '--set autopilot.estimator: "kalman" needs [sensors.imu], [sensors.magneto'),
-        ("autopilot.follow_trajectory=false", "--set autopilot.follow_trajectory: false leaves no source of setpoints"),
+        ("autopilot.estimator=kalman", 'override autopilot.estimator: "kalman" needs [sensors.imu], [sensors.magneto'),
+        (
+            "autopilot.follow_trajectory=false",
+            "override autopilot.follow_trajectory: false leaves no source of setpoints",
+        ),
     ],
 )
 def test_bad_override_is_named(override, expected):
@@ -179,7 +188,7 @@ def test_fault_in_table_of_trajectory_is_named_with_its_line(write, tmp_path, te
 
 def test_trajectory_tables_may_be_missing_or_inline():
     missing = said(HOVER, 'trajectory.phase.0.z={kind="table", file="none.csv"}')
-    assert missing == "--set trajectory.phase.0.z.file: lapwing/scenes/none.csv: no such file or directory"
+    assert missing == "override trajectory.phase.0.z.file: lapwing/scenes/none.csv: no such file or directory"
     values = 'trajectory.phase.0.z={kind="table", points=[[0.0, 0.0], [1.0, 1.0]]}'
     assert load(HOVER, [values])[Trajectory].phase[0].z[0].points == ((0.0, 0.0), (1.0, 1.0))
     later = values.replace("[0.0, 0.0]", "[0.5, 0.0]")

@@ -57,7 +57,7 @@ def test_critical_battery_prevents_arming():
     script = {0.04: [command("arm", id=1)]}
     flight = fly(0.5, script, "effects.battery.initial_charge=0.06")
     assert results(flight)[1] == REJECTED
-    assert "arming refused: the battery is low: 6%" in sent_texts(flight)
+    assert "Arming denied: the battery is low: 6%" in sent_texts(flight)
     flight = fly(0.5, script)
     assert np.all(np.isnan(flight.column("battery", lambda m: m.percentage)))
     assert results(flight)[1] == 0

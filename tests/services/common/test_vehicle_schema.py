@@ -82,14 +82,14 @@ def test_vehicle_mass_sets_airframe_mass(overrides):
 @pytest.mark.parametrize(
     ("scene", "overrides", "message"),
     [
-        ("hover", ["vehicle.mas=9.5"], "--set vehicle.mas: unknown key 'mas'; did you mean mass?"),
-        ("hover", ["vehicle.mass=0"], "--set vehicle.mass: expected a number above 0 [kg], got 0"),
+        ("hover", ["vehicle.mas=9.5"], "override vehicle.mas: unknown key 'mas'; did you mean mass?"),
+        ("hover", ["vehicle.mass=0"], "override vehicle.mass: expected a number above 0 [kg], got 0"),
         (
             "hover",
             ["vehicle.mass=9", "airframe.mass.total=8"],
-            "--set vehicle.mass: 9 kg, but airframe.mass.total = 8 kg; expected one of them",
+            "override vehicle.mass: 9 kg, but airframe.mass.total = 8 kg; expected one of them",
         ),
-        ("gyrostat_chaotic", ["vehicle.mass=9"], "--set vehicle.mass: the vehicle has no airframe"),
+        ("gyrostat_chaotic", ["vehicle.mass=9"], "override vehicle.mass: the vehicle has no airframe"),
     ],
 )
 def test_invalid_vehicle_mass_is_rejected(scene, overrides, message):

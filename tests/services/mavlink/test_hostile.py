@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.links.link import MAX_RATE
 from lapwing.services.mavlink.protocols import handlers
-from lapwing.services.mavlink.protocols.commands import RULES
+from lapwing.services.mavlink.protocols.commands import READ_ONLY, RULES
 
 NAN, INF = float("nan"), float("inf")
 
@@ -175,7 +175,12 @@ def test_unknown_mission_kind_is_rejected():
     ],
 )
 def test_invalid_commands_are_acknowledged(number, params, result):
-    assert Bench().station().command(number, *params) == result
+    station = Bench().station()
+    assert station.command(number, *params) == result
+    by_autopilot = number == mavlink.MAV_CMD_DO_SET_MISSION_CURRENT  # which sends its own text
+    denied = result == mavlink.MAV_RESULT_DENIED and number not in READ_ONLY and not by_autopilot
+    texts = [m.text for m in station.all("STATUSTEXT")]
+    assert any("denied, invalid parameters" in text for text in texts) == denied, texts
 
 
 @pytest.mark.parametrize("bad", [NAN, INF, -INF, 1e38])

@@ -54,6 +54,8 @@ def test_reboot_only_while_disarmed(action, armed, result):
     set_whole(bench, station, "MAV_SYS_ID", 42)
     bench.step(2)
     assert station.command(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN, action) == result
+    texts = [m.text for m in station.all("STATUSTEXT")]
+    assert ("Reboot denied: disarm first" in texts) == (armed and action == 1.0)
     station.got.clear()
     bench.step(120)
     assert present_address(station) == {(1, 1)}

@@ -247,7 +247,7 @@ def test_parameters_rates_sticks_and_refusals(tmp_path):
         await asyncio.sleep(0.3)
         with pytest.raises(ActionError):
             await drone.action.disarm()
-        assert "disarming refused: the vehicle flies" in (await reported).text
+        assert "Disarming denied: not landed" in (await reported).text
         await drone.action.land()
         await first(drone.telemetry.armed(), lambda armed: not armed)
 

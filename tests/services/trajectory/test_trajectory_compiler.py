@@ -148,7 +148,7 @@ def test_inconsistent_phases_are_rejected(spec, message):
     ],
 )
 def test_invalid_trajectory_key_is_rejected_in_one_line(override, message):
-    with pytest.raises(SceneError, match=r"\A--set trajectory[^\n]+\Z") as error:
+    with pytest.raises(SceneError, match=r"\Aoverride trajectory[^\n]+\Z") as error:
         load("hover", [override])
     assert message in str(error.value)
 

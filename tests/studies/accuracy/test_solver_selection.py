@@ -153,7 +153,7 @@ def test_unreachable_accuracy_and_default_are_reported(measured_titles, tmp_path
     with pytest.raises(ValueError, match=r"os4.toml: solver.accuracy: 1e-12: no method meets .* 1e-07, by rkmk4"):
         solver_selection.overrides(load(path), lambda text: None)
     with pytest.raises(
-        ValueError, match=r"os4.toml: solver.accuracy: no solver is selected; pass that of `lapwing run`: --set"
+        ValueError, match=r"os4.toml: solver.accuracy: no solver is selected; override solver.integrator"
     ):
         method(load(path))
     with pytest.raises(SceneError, match=r"solver.accuracy: expected a number at least 1e-12, got 0"):

@@ -310,7 +310,7 @@ def test_comparison_pairs_runs(complete, tmp_path):
             ["hover", "--vary", "run.seed=choice(1,2)"],
             "--vary run.seed: each run has its own seed; use --seed",
         ),
-        (["hover", "--set", "run.seed=4"], "--set run.seed: each run has its own seed; use --seed"),
+        (["hover", "--set", "run.seed=4"], "override run.seed: each run has its own seed; use --seed"),
         (
             ["hover", "--vary", "vehicle.mass=normal(10,1)", "--vary", "vehicle.mass=uniform(9,10)"],
             "--vary vehicle.mass=uniform(9,10): vehicle.mass already has a distribution",

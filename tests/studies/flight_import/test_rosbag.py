@@ -66,6 +66,9 @@ def test_bag_of_mavros_hexacopter(tmp_path):
     assert "/mavros/setpoint_position/local" in result.unknown
     assert result.rotors == 6
     assert result.motor_voltage[0] == pytest.approx([0.30, 0.31, 0.32, 0.33, 0.34, 0.35], abs=1e-3)
+    (file,) = (tmp_path / "bag").glob("*.mcap")
+    (tmp_path / "bag" / "metadata.yaml").unlink()
+    assert np.array_equal(open_flight(file).position, result.position, equal_nan=True)
 
 
 def test_bag_without_throttles_has_no_motor_outputs(tmp_path):
@@ -105,3 +108,9 @@ def test_command_selects_vehicle_of_bag(tmp_path):
     assert open_flight(tmp_path / "f.mcap").position[:, 2] == pytest.approx(2.0)
     refused = subprocess.run(command, capture_output=True, text=True)
     assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
+    log = [*command[:-3], tmp_path / "f.mcap", "--out", tmp_path / "g.mcap"]
+    refused = subprocess.run(log, capture_output=True, text=True)
+    assert "is a Lapwing log already; use it without import" in refused.stderr
+    (tmp_path / "f.mcap").write_bytes(b"")
+    refused = subprocess.run(log, capture_output=True, text=True)
+    assert "f.mcap: is empty; expected a log (MCAP)" in refused.stderr

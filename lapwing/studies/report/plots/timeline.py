@@ -6,12 +6,13 @@ from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import over, phases, runs
 from lapwing.studies.report.plot import Panel, Plot, Stretch
 from lapwing.studies.report.style import AXIS_COLOURS, BOUND, COLOURS, FLOWN, QUIET
+from lapwing.studies.saturation import saturation, spans
 
 ORDER = 0
 TITLE = "Timeline"
 NEEDS = ("ground_truth", "status")
 BATTERY = ("", "low", "critical", "nearly empty")  # by Status.battery_warning
-MARKED = {"fault": BOUND, "contact": QUIET, "motors": COLOURS[4]}  # kinds of events shown as instants
+MARKED = {"fault": BOUND, "contact": QUIET}  # kinds of events shown as instants
 WIDTH = 0.004  # width of an instant, relative to the time span
 
 
@@ -29,6 +30,7 @@ def draw(flight: FlightData) -> Plot:
         "motor failed": (runs(t, failed), BOUND),
         "battery": (runs(t, warning), BOUND),
         "status text": (runs(t, status.text), COLOURS[3]),
+        "motor limit": (_saturated(flight), COLOURS[4]),
         **{kind: (_instants(flight, kind), colour) for kind, colour in MARKED.items()},
     }
     all_lanes = {lane: ([run for run in intervals if run[0]], colour) for lane, (intervals, colour) in lanes.items()}
@@ -48,6 +50,17 @@ def draw(flight: FlightData) -> Plot:
 
 def _label_where(flags: np.ndarray, text: str) -> np.ndarray:
     return np.where(flags, text, "")
+
+
+def _saturated(flight: FlightData) -> list[tuple[str, float, float]]:
+    """Return the intervals with a motor at a voltage limit, wide enough to be visible."""
+    highest = flight.origin.scene.get("airframe", {}).get("motor", {}).get("max_voltage")
+    if highest is None or not len(flight.armed):
+        return []
+    first, last = over(flight)["span"]
+    least = WIDTH * (last - first)
+    listed = spans(saturation(flight.truth, flight.armed, highest), flight.truth.times, highest)
+    return [(text, start, min(last, max(end, start + least))) for text, start, end in listed]
 
 
 def _instants(flight: FlightData, kind: str) -> list[tuple[str, float, float]]:

@@ -193,7 +193,7 @@ def test_error_is_one_line_with_key(scene, module, text, name, overrides, messag
     with pytest.raises(ConfigError) as caught:
         resolve(scene(module, text, name, *overrides))
     line = str(caught.value)
-    assert line.startswith("--set autopilot.controller")
+    assert line.startswith("override autopilot.controller")
     assert message in line
     assert "\n" not in line
 
