@@ -9,6 +9,7 @@ from lapwing.dynamics.terrain import Level, surface
 from lapwing.services.autopilot import estimator
 from lapwing.services.autopilot.custom.user_code_loader import controller_rate, estimator_rate, vehicle_model
 from lapwing.services.autopilot.estimator import Estimator
+from lapwing.services.autopilot.estimator.filter_parameters import NO_STATIC_PRESSURE_ERROR
 from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.autopilot.height_sensor import distance_sensor
 from lapwing.services.autopilot.initial_estimate import EXACT
@@ -112,6 +113,9 @@ def _estimator(scene: Scene, imu_every: int) -> Estimator:
     if distance_sensor(scene) == ports.RANGEFINDER:
         preset = preset._replace(sonar_half_beam_deg=0.5 * scene.lookup("sensors.rangefinder.beam_deg"))
         ground -= scene.lookup("sensors.rangefinder.position")[2]  # origin of the distance
+    if ports.BAROMETER in scene.tables("sensors"):
+        error = scene.lookup("sensors.barometer.static_pressure_error")
+        preset = preset._replace(static_pressure_error=tuple(error or NO_STATIC_PRESSURE_ERROR))
     return preset._replace(
         interval=scene[Communication].interval * imu_every,
         home=surroundings.home,
@@ -119,6 +123,7 @@ def _estimator(scene: Scene, imu_every: int) -> Estimator:
         atmosphere=surroundings.atmosphere,
         magnetic_field_world=known_magnetic_field(scene),
         ground_height=ground,
+        wind_speed=scene[Autopilot].expected_wind_speed,
         sonar_height_max=preset.sonar_height_max if level else 0.0,  # the filter assumes level ground
     )
 

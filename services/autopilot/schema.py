@@ -34,6 +34,7 @@ class Autopilot(FirmwareKeys):
     gains: str = "tuned"  # name of a shipped set or one in gains/ next to the scene, or path of a .toml file
     estimator: str = "kalman"  # the Kalman filter; "ground_truth": the true state; or "module:Name" of a user's class
     estimator_options: dict[str, Option] = Field(default_factory=dict)  # options of its constructor
+    expected_wind_speed: float = Field(default=10.0, ge=0, le=30)  # [m/s] expected by the Kalman filter
     attitude_error: Literal["euler", "so3"] = "euler"  # Euler angles, as in the paper, or SO(3)
     controller: str | None = None  # "px4": PX4's cascade; "module:Name": a user's; default: cascaded PID
     controller_options: dict[str, Option] = Field(default_factory=dict)  # options of its constructor

@@ -24,6 +24,7 @@ from lapwing.services.autopilot.estimator.filter_state import (
     SIZE,
     THETA,
     VELOCITY,
+    WIND,
     Memory,
     Nominal,
     State,
@@ -88,7 +89,7 @@ def reset_imu_biases(p: Estimator, s: State) -> State:
             c[k, k] = deviation * deviation
             s.memory.considered[k, :] = 0.0
     s.memory.considered[:SIZE, :MAG_SCALE] = 0.0
-    s.memory.considered[:SIZE, LIFT:] = 0.0
+    s.memory.considered[:SIZE, LIFT:WIND] = 0.0
     nominal = Nominal(
         n.attitude, n.velocity_world, n.position_world, ZERO, ZERO, n.gps_correlated_error,
         n.magnetometer_bias, n.heading_bias, n.barometer_bias, n.sonar_scale,

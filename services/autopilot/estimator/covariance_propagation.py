@@ -19,9 +19,11 @@ from lapwing.services.autopilot.estimator.filter_state import (
     VARIANCE,
     VELOCITY,
     WANDER,
+    WIND_SQUARES,
     Memory,
     three,
 )
+from lapwing.services.autopilot.estimator.static_pressure import considers_wind
 
 
 @always_inline
@@ -43,9 +45,9 @@ def _load(c: np.ndarray, width: int, i: int, j: int) -> Any:
 
 
 @always_inline
-def _transform_rows(c: np.ndarray, width: int, f: Vec3, r: Mat3, dt: float) -> None:
-    """Compute c <- F c."""
-    for j in range(0, width, 4):
+def _transform_rows(c: np.ndarray, width: int, first: int, stop: int, f: Vec3, r: Mat3, dt: float) -> None:
+    """Compute c <- F c for the columns from `first` to `stop` of a matrix with rows of `width`."""
+    for j in range(first, stop, 4):
         changed = _transformed_rows(
             _load(c, width, THETA, j), _load(c, width, VELOCITY, j), _load(c, width, POSITION, j),
             _load(c, width, GYRO, j), _load(c, width, ACCELEROMETER, j), f, r, dt,
@@ -59,7 +61,7 @@ def _transform_rows(c: np.ndarray, width: int, f: Vec3, r: Mat3, dt: float) -> N
 @always_inline
 def propagate_covariance(c: np.ndarray, f: Vec3, r: Mat3, dt: float) -> None:
     """Compute c <- F c F^T for a symmetric c (24, 24), with the specific force f [m/s^2] and r body to world."""
-    _transform_rows(c, SIZE, f, r, dt)
+    _transform_rows(c, SIZE, 0, SIZE, f, r, dt)
     for i in range(GYRO):  # F changes no row below
         row = c[i]
         theta, velocity, position = _transformed_rows(
@@ -128,7 +130,9 @@ def propagate_considered(m: Memory, omega: Vec3, f: Vec3, r: Mat3, dt: float) ->
     Call after `propagate_covariance`; `omega` is the rate [rad/s], f the specific force [m/s^2] in the world.
     """
     c, k = m.covariance, m.considered
-    _transform_rows(k, CONSIDERED, f, r, dt)
+    _transform_rows(k, CONSIDERED, 0, WIND_SQUARES, f, r, dt)
+    if considers_wind(m):
+        _transform_rows(k, CONSIDERED, WIND_SQUARES, CONSIDERED, f, r, dt)
     turns, lifts = _turns(omega, r, dt), _lifts(f, r, dt)
     _add_half(m, THETA, GYRO_SCALE, turns)
     _add_half(m, VELOCITY, LIFT, lifts)

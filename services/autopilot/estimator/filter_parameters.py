@@ -9,6 +9,8 @@ from lapwing.dynamics.environment import STANDARD
 from lapwing.dynamics.geodesy import Home
 from lapwing.dynamics.vector import Vec3
 
+NO_STATIC_PRESSURE_ERROR = (0.0, 0.0, 0.0, 0.0, 0.0)
+
 
 class Estimator(NamedTuple):
     """Filter parameters without white noise: every reading has its own variance."""
@@ -31,6 +33,9 @@ class Estimator(NamedTuple):
     accelerometer_bias_walk: Annotated[float, Ge(0)] = 1e-4  # [m/s^2/sqrt(s)]
     accelerometer_scale_std: Annotated[float, Ge(0)] = 1e-3  # ratio, of the body's z axis
     accelerometer_alignment_std: Annotated[float, Ge(0)] = 9e-4  # [rad] about the body's x and y axes
+    static_pressure_error: tuple[float, float, float, float, float] = NO_STATIC_PRESSURE_ERROR
+    """Share of the dynamic pressure in flight forwards, backwards, to the right, to the left and vertically."""
+    wind_speed: Annotated[float, Ge(0)] = 10.0  # [m/s] expected 6 m above the ground, of unknown direction
     barometer_walk: Annotated[float, Ge(0)] = 0.02  # [m/sqrt(s)], with the weather
     magnetometer_bias_std: Annotated[float, Ge(0)] = 5.1e-8  # [T] hard iron after calibration
     magnetometer_bias_walk: Annotated[float, Ge(0)] = 6e-10  # [T/sqrt(s)]

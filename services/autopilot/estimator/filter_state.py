@@ -10,14 +10,15 @@ import numpy as np
 from lapwing.dynamics.lie.quaternion import Quaternion, exp, from_matrix, multiply, normalise, rotation_matrix
 from lapwing.dynamics.vector import ZERO, Vec3, add, cross, dot, norm, scale, subtract
 from lapwing.kernels import always_inline, kernel, math
-from lapwing.services.autopilot.estimator.filter_parameters import Estimator
+from lapwing.services.autopilot.estimator.filter_parameters import NO_STATIC_PRESSURE_ERROR, Estimator
 from lapwing.services.common.ports import StateEstimate
 
 SIZE = 24
 THETA, VELOCITY, POSITION, GYRO, ACCELEROMETER, WANDER, IRON = 0, 3, 6, 9, 12, 15, 18
 HEADING, BAROMETER, SCALE = 21, 22, 23
-CONSIDERED = 16  # constant errors of instruments that are considered and not estimated (theory.md, eq. (3.60))
+CONSIDERED = 20  # errors of instruments that are considered and not estimated (theory.md, eqs. (3.60) and (3.67))
 GYRO_SCALE, GYRO_ALIGNMENT, MAG_SCALE, MAG_ALIGNMENT, LIFT = 0, 3, 6, 9, 11  # LIFT: accelerometers, eq. (3.66)
+WIND, WIND_SQUARES, GUST = 14, 16, 18  # static pressure error, eq. (3.67); column 19 is empty
 # Rows of `considered`: variances, row of H, covariance with the innovation
 VARIANCE, ROW, PRODUCT = SIZE, SIZE + 1, SIZE + 2
 
@@ -67,7 +68,7 @@ class Memory(NamedTuple):
     correction: np.ndarray  # (24,) pending correction of the estimate
     row: np.ndarray  # (24,) of the measurement matrix
     product: np.ndarray  # (24,) covariance times row
-    considered: np.ndarray  # (27, 16) covariance of the error with these parameters; then VARIANCE, ROW, PRODUCT
+    considered: np.ndarray  # (27, 20) covariance of the error with these parameters; then VARIANCE, ROW, PRODUCT
     history: np.ndarray  # (HISTORY, 8) velocity_gain, distance_gain, noise added to velocity and attitude
     since: np.ndarray  # (WATCHED,) ticks since a source was last accepted, or NEVER
     rejected: np.ndarray  # (WATCHED,) 1 if the last reading of a source was rejected
@@ -158,6 +159,11 @@ def initial(p: Estimator, m: Memory, position_world: Vec3, specific_force_body: 
     alignment = p.accelerometer_alignment_std * p.accelerometer_alignment_std
     m.considered[VARIANCE, LIFT : LIFT + 2] = alignment
     m.considered[VARIANCE, LIFT + 2] = p.accelerometer_scale_std * p.accelerometer_scale_std
+    if p.static_pressure_error != NO_STATIC_PRESSURE_ERROR and p.wind_speed > 0.0:
+        square = p.wind_speed * p.wind_speed
+        m.considered[VARIANCE, WIND : WIND + 2] = 0.5 * square
+        m.considered[VARIANCE, WIND_SQUARES : WIND_SQUARES + 2] = 0.5 * square * square
+        m.considered[VARIANCE, GUST] = 1.0
     attitude = attitude_from_gravity(p, specific_force_body, field_body)
     nominal = Nominal(attitude, ZERO, position_world, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, 0.0)
     return State(nominal, Inertial(0, ZERO, specific_force_body, (0.0, 0.0, p.gravity), ZERO, ZERO, False, 0), m)

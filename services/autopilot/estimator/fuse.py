@@ -18,6 +18,7 @@ from lapwing.services.autopilot.estimator.filter_state import (
     VARIANCE,
     Memory,
 )
+from lapwing.services.autopilot.estimator.static_pressure import considers_wind
 
 FLOOR = 1e-8  # minimum measurement variance, which keeps S well above round-off with ideal instruments
 
@@ -56,6 +57,11 @@ def innovation_variance(m: Memory, variance: float) -> float:
     store(m.considered, CONSIDERED * PRODUCT + 4, second)
     store(m.considered, CONSIDERED * PRODUCT + 8, third)
     store(m.considered, CONSIDERED * PRODUCT + 12, fourth)
+    if considers_wind(m):
+        fifth = load(m.considered, CONSIDERED * ROW + 16) * load(m.considered, CONSIDERED * VARIANCE + 16)
+        for j in range(SIZE):
+            fifth = fifth + m.row[j] * load(m.considered, CONSIDERED * j + 16)
+        store(m.considered, CONSIDERED * PRODUCT + 16, fifth)
     total = variance + FLOOR
     for k in range(CONSIDERED):
         g = m.considered[ROW, k]
@@ -100,6 +106,11 @@ def apply_update(m: Memory, innovation: float, s: float) -> float:
         store(m.considered, offset + 4, load(m.considered, offset + 4) - gain * second)
         store(m.considered, offset + 8, load(m.considered, offset + 8) - gain * third)
         store(m.considered, offset + 12, load(m.considered, offset + 12) - gain * fourth)
+    if considers_wind(m):
+        fifth = load(m.considered, CONSIDERED * PRODUCT + 16) * inverse
+        for i in range(SIZE):
+            offset = CONSIDERED * i + 16
+            store(m.considered, offset, load(m.considered, offset) - m.product[i] * fifth)
     return y * y * inverse
 
 

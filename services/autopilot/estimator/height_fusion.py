@@ -1,11 +1,11 @@
-"""Fusion of sonar near the ground and barometer (theory.md, eqs. (3.31), (3.32) and (3.39))."""
+"""Fusion of sonar near the ground and barometer (theory.md, eqs. (3.31), (3.32), (3.39) and (3.67))."""
 
 from lapwing.dynamics.atmosphere import pressure_altitude
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import ZERO
 from lapwing.kernels import kernel, math
 from lapwing.services.autopilot.estimator.covariance_inflation import inflate_covariance
-from lapwing.services.autopilot.estimator.filter_parameters import Estimator
+from lapwing.services.autopilot.estimator.filter_parameters import NO_STATIC_PRESSURE_ERROR, Estimator
 from lapwing.services.autopilot.estimator.filter_state import (
     BARO,
     BAROMETER,
@@ -17,6 +17,7 @@ from lapwing.services.autopilot.estimator.filter_state import (
 )
 from lapwing.services.autopilot.estimator.fuse import clear, fuse, innovation_variance
 from lapwing.services.autopilot.estimator.measurement_checks import is_stuck, record_gate_result
+from lapwing.services.autopilot.estimator.static_pressure import static_pressure_height
 
 _GROUND_GRADIENT, _GROUND_RATE = 0.5, 0.5  # m/m, [m/s] variation of the ground under the vehicle
 
@@ -56,6 +57,8 @@ def update_barometer(p: Estimator, s: State, pressure: float, variance: float, v
     m.row[POSITION + 2] = 1.0
     m.row[BAROMETER] = 1.0
     innovation = altitude - s.nominal.position_world[2] - s.nominal.barometer_bias
+    if p.static_pressure_error != NO_STATIC_PRESSURE_ERROR:
+        innovation -= static_pressure_height(p, s)
     return _scalar(p, s, BARO, innovation, variance * slope * slope)
 
 

@@ -21,6 +21,7 @@ from lapwing.services.autopilot.estimator.filter_state import (
     State,
 )
 from lapwing.services.autopilot.estimator.measurement_checks import is_stuck
+from lapwing.services.autopilot.estimator.static_pressure import decorrelate_gusts
 
 _LINEAR = 0.1  # fraction of a jolt up to which the change between two readings counts as linear
 _IMPACT = 0.5  # [m/s] change of velocity that may hide between two readings
@@ -135,6 +136,7 @@ def predict(
     propagate_considered(m, omega_mean, force_mean, r, dt)
     keep = math.exp(-dt / p.gps_correlation_time)
     fade(m, keep)
+    decorrelate_gusts(p, s)
 
     jolt = norm(subtract(specific_force_body, i.force))
     twist = norm(subtract(omega_body, i.omega))
