@@ -2,7 +2,8 @@
 
 `python -m benchmarks.identification_coverage [SEEDS [FIRST [linear]]]` flies SEEDS seeds from FIRST on, estimates four
 parameters from each flight, and prints how many true values lie within two standard errors. Exact standard errors give
-95 %. With `linear` the moment equations are linearised about the true values and then solved, in a seventh of the time.
+95 %. With `linear` the moment equations are linearised about the true values and then solved, in a twentieth of the
+time.
 """
 
 import sys

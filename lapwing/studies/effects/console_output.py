@@ -34,6 +34,8 @@ def show(console: Console, study: Study) -> None:
 
 
 def _table(console: Console, title: str, study: Study, active: bool) -> None:
+    if not _sorted_rows(study, active):
+        return
     console.print(title)
     table = Table(box=SIMPLE, pad_edge=False, collapse_padding=True)  # 80 columns hold all digits
     table.add_column("effect", no_wrap=True)
