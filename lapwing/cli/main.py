@@ -102,11 +102,12 @@ def _usage_text(error: typer.BadParameter) -> str:
     """Return the fault of a command line, with the value that typer leaves out."""
     details: list = getattr(error.__cause__, "errors", list)()  # of pydantic, in newer versions of typer
     parameter = getattr(error, "param", None)
-    if not details or parameter is None:
+    if not details or parameter is None or details[0]["type"] == "value_error":
         return error.format_message()
-    name = parameter.opts[0] if parameter.opts[0].startswith("-") else parameter.human_readable_name
-    expected = str(details[0]["msg"]).replace("Input should be", "expected").partition(", unable to parse")[0]
-    return f"{name} {details[0]['input']}: {expected}"
+    name = parameter.opts[0] if parameter.opts[0].startswith("-") else str(parameter.metavar or parameter.name)
+    expected = details[0]["msg"].removeprefix("Input should be ").partition(", unable to parse")[0]
+    number = "a number " if expected.startswith(("less", "greater")) else ""
+    return f"{name} {details[0]['input']}: expected {number}{expected}"
 
 
 if __name__ == "__main__":

@@ -219,9 +219,9 @@ def test_faults_are_one_clear_line(path, tmp_path):
         LogWriter(tmp_path, {}, {})
     with pytest.raises(ValueError, match="cannot read the log: No such file"):
         LogReader(path)
-    for text in (b"", b"hello, this is text"):
+    for text, message in ((b"", "is empty"), (b"hello, this is text", "not an MCAP file")):
         path.write_bytes(text)
-        with pytest.raises(ValueError, match="not an MCAP file"):
+        with pytest.raises(ValueError, match=message):
             LogReader(path)
 
 

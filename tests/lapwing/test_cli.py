@@ -86,7 +86,7 @@ BAD = {
         [HOVER, "--mode", "single-process", "--set", "ros2.enabled=true"],
         "--ros2: needs --mode multi-process",
     ),
-    "ROS 2 domain": ([HOVER, "--ros2", "233"], "'--ros2': Input should be less than or equal to 232"),
+    "ROS 2 domain": ([HOVER, "--ros2", "233"], "--ros2 233: expected a number less than or equal to 232"),
     "router alone": ([HOVER, "--ros2-router", "127.0.0.1:7447"], "--ros2-router 127.0.0.1:7447: expected with --ros2"),
     "router elsewhere": ([HOVER, "--ros2", "0", "--ros2-router", "robot:7447"], "robot:7447: programs of that host"),
     "program": ([HOVER, "--external", "autopilot=tcp/[::1]:1"], "use unixsock-stream/PATH in a folder of your"),

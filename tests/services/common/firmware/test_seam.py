@@ -149,7 +149,7 @@ def test_accuracy_of_recorded_commands_is_measured(tmp_path, monkeypatch, accura
     ("options", "message"),
     [
         (("--set", "solver.step=0.001"), "--set: the solver of a log is the recorded one; only solver.accuracy can"),
-        (("--set", "solver.accuracy=-1"), "override solver.accuracy: expected a number above 0, got -1"),
+        (("--set", "solver.accuracy=-1"), "--set solver.accuracy: expected a number above 0, got -1"),
         ((), "solver.accuracy: missing; set the error to compare with"),
     ],
 )
