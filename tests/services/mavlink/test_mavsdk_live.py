@@ -243,7 +243,7 @@ def test_parameters_rates_sticks_and_refusals(tmp_path):
         start = await push(0.0, 0.5, lambda o: abs(o.velocity.down_m_s) < 0.1)
         # the vehicle faces east
         await push(0.6, 0.5, lambda o: o.position.east_m > start.position.east_m + 4.0)
-        reported = asyncio.ensure_future(first(drone.telemetry.status_text(), lambda s: "flies" in s.text))
+        reported = asyncio.ensure_future(first(drone.telemetry.status_text(), lambda s: "denied" in s.text))
         await asyncio.sleep(0.3)
         with pytest.raises(ActionError):
             await drone.action.disarm()

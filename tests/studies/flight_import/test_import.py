@@ -62,7 +62,7 @@ def broken(path, text):
         ("flight.csv", b"a,b\n1,2\n", "none of the mapped columns"),
         ("flight.csv.gz", b"no gzip", "cannot be read"),
         ("flight.txt", b"1 2 3", "unknown format"),
-        ("flight.mcap", b"\x89MCAP0\r\n", "use its folder with metadata.yaml"),
+        ("flight.mcap", b"\x89MCAP0\r\n", "is not a readable rosbag2"),
     ],
 )
 def test_command_rejects_unreadable_files(tmp_path, name, content, message):
