@@ -50,8 +50,9 @@ FROM packages AS built
 # The command, which finds the sources in /app.
 COPY pyproject.toml README.md LICENSE ./
 COPY --from=dependencies /opt/backend /opt/backend
-RUN PYTHONPATH=/opt/backend pip --python /opt/lapwing/bin/python install --prefix /image/opt/lapwing --no-deps --no-build-isolation --no-index \
-        --no-cache-dir --no-warn-script-location --config-settings editable_mode=compat --editable . && \
+RUN PYTHONPATH=/opt/backend pip --python /opt/lapwing/bin/python install --prefix /image/opt/lapwing --no-deps \
+        --no-build-isolation --no-index --no-cache-dir --no-warn-script-location \
+        --config-settings editable_mode=compat --editable . && \
     mkdir -p /image/app && cp -rp /image/opt/lapwing/. /opt/lapwing/
 # With kernels of an earlier image, if deploy/build.sh has found one: what has not changed is not compiled again.
 COPY . /build/

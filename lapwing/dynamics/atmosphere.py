@@ -90,3 +90,18 @@ def pressure_altitude(a, pressure_now):
         at_tropopause = a.sea_level_pressure * math.pow(kelvin / ground, EXPONENT)
         height = TROPOPAUSE + math.log(at_tropopause / pressure_now) * GAS_CONSTANT * kelvin / GRAVITY
     return EARTH_RADIUS * height / (EARTH_RADIUS - height)
+
+
+@always_inline
+def share_of_squares(shares, velocity_body):
+    """Return a static pressure position error over half the density [m^2/s^2] (theory.md, eq. (3.65)).
+
+    Args:
+        shares: of the dynamic pressure, in flight forwards, backwards, to the right, to the left and vertically.
+        velocity_body: velocity through the air [m/s] in FLU.
+    """
+    forward, backward, right, left, vertical = shares
+    x, y, z = velocity_body
+    along = (forward if x > 0.0 else backward) * x * x
+    across = (left if y > 0.0 else right) * y * y
+    return along + across + vertical * z * z

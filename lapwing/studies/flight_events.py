@@ -10,7 +10,7 @@ from lapwing.services.common import ports, status_texts
 from lapwing.services.common.event_kinds import KINDS
 from lapwing.studies.ground_contacts import ground_contacts
 from lapwing.studies.model_validity import validity_warnings
-from lapwing.studies.saturation import description, intervals, saturation
+from lapwing.studies.saturation import description, highest_voltage, intervals, saturation
 from lapwing.studies.tension import link_tension, pushes
 from lapwing.studies.topic_view import TopicView
 
@@ -45,7 +45,7 @@ def events(
         result += _status_events(status)
         result += _contacts(truth)
         result += [Event(warning.start, "warning", warning.text) for warning in validity_warnings(truth, scene)]
-        highest = scene.get("airframe", {}).get("motor", {}).get("max_voltage")
+        highest = highest_voltage(scene)
         if highest is not None and len(armed):
             result += _saturation(truth, armed, highest)
     if setpoint is not None and len(setpoint):

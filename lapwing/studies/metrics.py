@@ -14,7 +14,7 @@ from lapwing.services.common.success_criteria import Success
 from lapwing.studies.consistency import SOURCES, consistency
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.ground_contacts import ground_contacts
-from lapwing.studies.saturation import limits, saturation
+from lapwing.studies.saturation import highest_voltage, limits, saturation
 from lapwing.studies.tracking import AXES, Reference, errors, plain, reach, rmse, roll_pitch_yaw, strided_view, total
 
 SIGMAS = 3.0  # standard deviations of the estimate
@@ -79,7 +79,7 @@ def metrics(flight: FlightData) -> dict[str, Any]:
         result |= {"touchdown.speed": outcome.touchdown}
     if n == 0:
         return result
-    highest = flight.origin.scene.get("airframe", {}).get("motor", {}).get("max_voltage")
+    highest = highest_voltage(flight.origin.scene)
     if highest is not None:
         limits = saturation(truth, armed, highest)
         result["saturation"] = limits.share(limits.lasted)

@@ -1,6 +1,7 @@
 """Motor saturation: motors at a voltage limit in the air."""
 
 import functools
+from collections.abc import Mapping
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -35,6 +36,11 @@ class Saturation(NamedTuple):
     def share(self, seconds: float) -> float:
         """Return a duration [s] as a share of the time in the air."""
         return seconds / max(float(self.step[self.flying].sum()), 1e-9)
+
+
+def highest_voltage(scene: Mapping[str, Any]) -> float | None:
+    """Return the highest motor voltage [V] of a scene's tables; None if it has none."""
+    return scene.get("airframe", {}).get("motor", {}).get("max_voltage")
 
 
 def saturation(truth: TopicView, armed: np.ndarray, highest: float) -> Saturation:

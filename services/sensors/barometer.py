@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le, Lt
 
-from lapwing.dynamics.atmosphere import pressure
+from lapwing.dynamics.atmosphere import pressure, share_of_squares
 from lapwing.dynamics.lie.quaternion import rotate_back
 from lapwing.dynamics.noise import TURN_ON, Key, normal, normal3
 from lapwing.dynamics.vector import ZERO, Vec3
@@ -73,10 +73,7 @@ def position_error(e: StaticPressureError | None, truth: Truth) -> float:
     """Return the static pressure error [Pa] of the flow around the vehicle (theory.md, eq. (3.65))."""
     if e is None:
         return 0.0
-    x, y, z = rotate_back(truth.attitude, truth.air_velocity_world)
-    along = (e.forward if x > 0.0 else e.backward) * x * x
-    across = (e.left if y > 0.0 else e.right) * y * y
-    return 0.5 * truth.air_density * (along + across + e.vertical * z * z)
+    return 0.5 * truth.air_density * share_of_squares(e, rotate_back(truth.attitude, truth.air_velocity_world))
 
 
 @always_inline

@@ -1,4 +1,4 @@
-"""Time-outs that do not count time in which a process got no CPU."""
+"""Time-outs that do not count time in which a process got no CPU, or the machine waited (`machine_stall_time`)."""
 
 import os
 import time

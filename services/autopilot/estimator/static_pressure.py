@@ -1,5 +1,6 @@
 """Static pressure error of the barometer in wind of unknown direction (theory.md, eqs. (3.67) and (3.68))."""
 
+from lapwing.dynamics.atmosphere import share_of_squares
 from lapwing.dynamics.effects._turbulence import HIGHEST, LOWEST, SLOWEST, intensity
 from lapwing.dynamics.lie.quaternion import rotate_back, rotation_matrix
 from lapwing.kernels import always_inline, kernel, math
@@ -47,9 +48,8 @@ def static_pressure_height(p: Estimator, s: State) -> float:
     """
     forward, backward, right, left, vertical = p.static_pressure_error
     n, k = s.nominal, s.memory.considered
-    x, y, z = rotate_back(n.attitude, n.velocity_world)
-    along, across = forward if x > 0.0 else backward, left if y > 0.0 else right
-    height = -0.5 * (along * x * x + across * y * y + vertical * z * z) / p.gravity
+    velocity = x, y, z = rotate_back(n.attitude, n.velocity_world)
+    height = -0.5 * share_of_squares(p.static_pressure_error, velocity) / p.gravity
     if considers_wind(s.memory):
         mean_x, mean_y = 0.5 * (forward + backward), 0.5 * (right + left)
         mean, difference = 0.5 * (mean_x + mean_y), 0.5 * (mean_x - mean_y)

@@ -88,8 +88,7 @@ def execute(session: Session, command: Command) -> None:
         if session.endpoint.last_heartbeat is None:
             session.send_text("command rejected: send a HEARTBEAT first")
     else:
-        name = mavlink.enums["MAV_CMD"][command.number].name.removeprefix("MAV_CMD_")
-        reason = f"{name}: denied, invalid parameters"
+        reason = ""
         try:
             outcome = function(session, command)
         except DeniedError as error:
@@ -98,7 +97,8 @@ def execute(session: Session, command: Command) -> None:
             outcome = DENIED
             session.count("invalid command")
         if outcome == DENIED and command.number not in READ_ONLY:
-            session.send_text(reason)
+            name = mavlink.enums["MAV_CMD"][command.number].name.removeprefix("MAV_CMD_")
+            session.send_text(reason or f"{name}: denied, invalid parameters")
 
     def acknowledge(result: int, progress: int = NO_PROGRESS) -> None:
         session.send(mavlink.MAVLink_command_ack_message(command.number, result, progress, 0, *session.address))

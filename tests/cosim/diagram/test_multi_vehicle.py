@@ -155,7 +155,8 @@ def test_topics_of_vehicle_of_fleet():
 WRONG = {
     "vehicle.7.name=x": "override vehicle.7.name=x: no such vehicle; expected vehicle.N.name, N from 0 to 2",
     "vehicle.left.initial_position=[0,0]": (
-        "override vehicle.left.initial_position=[0,0]: no such vehicle; expected vehicle.N.initial_position, N"
+        "override vehicle.left.initial_position=[0,0]: no such vehicle; "
+        "expected vehicle.N.initial_position, N from 0 to 2"
     ),
     "vehicle.left.airframe.mass.total=3": (
         "override vehicle.left.airframe.mass.total=3: no such vehicle; expected vehicle.N.airframe.mass.total, N from"
@@ -166,7 +167,9 @@ WRONG = {
     "vehicle.1.mavlink.system_id=1": "override vehicle.1.mavlink.system_id: 1 is already used by vehicle.0",
     "vehicle.2.autopilot.gains=x": "override vehicle.2.autopilot.gains: unknown gain set 'x'",
     "vehicle.0.nam=3": "override vehicle.0.nam: unknown key 'nam'; did you mean name?",
-    "vehicle.0.airframe.mass.total=-3": "override vehicle.0.airframe.mass.total: expected a number above 0 [kg]",
+    "vehicle.0.airframe.mass.total=-3": (
+        "override vehicle.0.airframe.mass.total: expected a number above 0 [kg], got -3"
+    ),
     "autopilot.gains=x": "override autopilot.gains: unknown gain set 'x'",
 }
 

@@ -7,7 +7,7 @@ from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import over
 from lapwing.studies.report.plot import Level, Line, NotRecordedError, Panel, Plot, column
 from lapwing.studies.report.style import BOUND, COLOURS, STEERED
-from lapwing.studies.saturation import saturation
+from lapwing.studies.saturation import highest_voltage, saturation
 
 ORDER = 50
 TITLE = "Motors: speed, voltage and power"
@@ -45,7 +45,7 @@ def motors(t: np.ndarray, values: np.ndarray) -> tuple[Line, ...]:
 
 def limits(flight: FlightData) -> tuple[tuple[Level | Line, ...], str]:
     """Return the voltage limits, the intervals at a limit, and a sentence on them."""
-    highest = flight.origin.scene.get("airframe", {}).get("motor", {}).get("max_voltage")
+    highest = highest_voltage(flight.origin.scene)
     if highest is None:
         return (), "The log has no voltage limit."
     levels = Level(0.0, "limits", BOUND, "dot"), Level(highest, "limits", BOUND, "dot")

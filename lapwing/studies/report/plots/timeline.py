@@ -6,7 +6,7 @@ from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_phases import over, phases, runs
 from lapwing.studies.report.plot import Panel, Plot, Stretch
 from lapwing.studies.report.style import AXIS_COLOURS, BOUND, COLOURS, FLOWN, QUIET
-from lapwing.studies.saturation import saturation, spans
+from lapwing.studies.saturation import highest_voltage, saturation, spans
 
 ORDER = 0
 TITLE = "Timeline"
@@ -54,7 +54,7 @@ def _label_where(flags: np.ndarray, text: str) -> np.ndarray:
 
 def _saturated(flight: FlightData) -> list[tuple[str, float, float]]:
     """Return the intervals with a motor at a voltage limit, wide enough to be visible."""
-    highest = flight.origin.scene.get("airframe", {}).get("motor", {}).get("max_voltage")
+    highest = highest_voltage(flight.origin.scene)
     if highest is None or not len(flight.armed):
         return []
     first, last = over(flight)["span"]
