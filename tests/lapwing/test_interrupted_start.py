@@ -44,3 +44,24 @@ def test_termination_at_import():
 def test_exit_code_is_equal_with_closed_streams():
     with open("/dev/full", "w") as full:
         assert struck("typer", signal.SIGINT, full).returncode == 130
+
+
+HALF_MADE = """
+import os, signal
+from lapwing.cli import entry_point
+
+class Text:  # like llvmlite's OutputString, whose __del__ reads an attribute of __init__
+    def __init__(self):
+        os.kill(os.getpid(), signal.SIGINT)
+        self.pointer = 0
+    def __del__(self):
+        print(self.pointer)
+
+entry_point.prepare_streams = Text
+entry_point.main()
+"""
+
+
+def test_object_of_interrupted_constructor_is_silent():
+    done = subprocess.run([sys.executable, "-c", HALF_MADE], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "lapwing: ended by SIGINT\n")

@@ -85,7 +85,6 @@ def test_user_picks_changes_runs_looks_and_compares(start, tmp_path):
     studio = start(tmp_path)
     with chromium.Browser(studio.address, tmp_path / "profile", (1280, 900)) as browser:
         user = User(browser)
-        assert "scenes/hover" in user.do("await until(() => one('.scenes')); return one('.scenes').innerHTML;")
         assert fly(user, {}) == "lapwing run hover --speed max"
         user.do("await until(() => one('.outcome'));")
         user.go("one('.brand').click()", studio.address)

@@ -44,14 +44,19 @@ class Stop:
 def raise_on_interrupt() -> None:
     """Let the signals of `ENDING` raise `Interrupted` immediately; a run uses `Stop` instead."""
 
+    raised = False
+
     def raise_(number: int, _: object) -> None:
+        nonlocal raised
+        raised = True
         # An exception that is raised inside a call from the compiler's library is lost there: raise it again, later.
         signal.signal(signal.SIGALRM, lambda *_: raise_(number, None))
         signal.setitimer(signal.ITIMER_REAL, REPEAT_DELAY)
         raise Interrupted(number)
 
     def report_unraisable(unraisable: "sys.UnraisableHookArgs") -> None:
-        if not isinstance(unraisable.exc_value, Interrupted):
+        # An interrupt leaves objects whose constructor has not finished; their `__del__` may fail.
+        if not raised:
             sys.__unraisablehook__(unraisable)
 
     sys.unraisablehook = report_unraisable
