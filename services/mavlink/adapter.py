@@ -173,7 +173,7 @@ class Adapter:
             return
         self.vehicle.put(topic, payload)
         if topic is ESTIMATE:
-            self.commands.started = True
+            self.commands.start()
             self.vehicle.time_ns = time_ns
             self.clock.now = Instant(time_ns, wall)
             self._step()

@@ -1,5 +1,6 @@
 """Encoding and decoding of the frames of one endpoint, with sequence numbers, checks and signatures (pymavlink)."""
 
+import re
 from collections import Counter
 from collections.abc import Iterator
 from typing import Any
@@ -9,6 +10,8 @@ from lapwing.services.mavlink.framing import frame
 from lapwing.services.mavlink.signing import Signature
 
 UNSIGNED = "unsigned, forged or replayed"
+_V1, _V2 = mavlink.PROTOCOL_MARKER_V1, mavlink.PROTOCOL_MARKER_V2
+_MARKER = re.compile(rb"\xfd(?=.[\0\1]|.?\Z)|\xfe", re.DOTALL)  # MAVLink 2: followed by a length and known flags
 
 
 class _Codec(mavlink.MAVLink):
@@ -84,7 +87,7 @@ class Channel:
         codec = self._codec
         if self._datagrams:
             codec.buf, codec.buf_index, codec.expected_length = bytearray(), 0, mavlink.HEADER_LEN_V1 + 2
-        message = codec.parse_char(data)
+        message = codec.parse_char(data) or self._next_in_stream()
         while message is not None:
             kind = message.get_type()
             if kind == "BAD_DATA":
@@ -94,14 +97,54 @@ class Channel:
                 if not self._framed:
                     self.foreign = True
                     return
+                if reason != UNSIGNED and message.data[0] in (_V1, _V2):
+                    self._resume_in(message.data)
             elif kind.startswith("UNKNOWN_"):
                 self._counts["unknown message"] += 1
+                self._resume_in(message.data)  # its checksum cannot be checked
             else:
                 self._framed = True
                 yield message
-            message = codec.parse_char(b"")
+            message = codec.parse_char(b"") or self._next_in_stream()
         del codec.buf[: codec.buf_index]
         codec.buf_index = 0
+
+    def _next_in_stream(self) -> Any:
+        """Return a message behind the pending bytes if these cannot become a frame.
+
+        Otherwise a marker in garbage swallows as many frames as the length behind it covers.
+        """
+        codec, message = self._codec, None
+        while message is None and not self._datagrams and self._framed and codec.buf_len():
+            pending = bytes(codec.buf[codec.buf_index :])
+            if _find_frame(pending) == 0:
+                break
+            codec.buf_index = len(codec.buf)
+            self._counts["not MAVLink"] += 1
+            self._resume_in(pending)
+            message = codec.parse_char(b"")
+        return message
+
+    def _resume_in(self, rejected: bytes) -> None:
+        """Continue in a stream with the first possible frame behind the marker of rejected bytes, the last ones read."""
+        codec = self._codec
+        if self._datagrams:
+            return
+        start = 1 + _find_frame(rejected[1:])
+        codec.buf, codec.buf_index = bytearray(rejected[start:]) + codec.buf[codec.buf_index :], 0
+
+
+def _find_frame(data: bytes) -> int:
+    """Return the index of the first bytes that may begin a frame of a known message; the length if there are none."""
+    for marker in _MARKER.finditer(data):
+        head = data[marker.start() : marker.start() + mavlink.HEADER_LEN_V2]
+        if len(head) < (mavlink.HEADER_LEN_V2 if head[0] == _V2 else mavlink.HEADER_LEN_V1):
+            return marker.start()
+        number = int.from_bytes(head[7:], "little") if head[0] == _V2 else head[5]
+        kind = mavlink.mavlink_map.get(number)
+        if kind and (head[0] == _V2 or head[1] <= kind.unpacker.size):  # MAVLink 2 has extensions unknown here
+            return marker.start()
+    return len(data)
 
 
 def _reason(reason: str) -> str:

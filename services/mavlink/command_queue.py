@@ -20,6 +20,7 @@ class CommandQueue:
         """Create an empty queue; `put` passes a command to the autopilot, None for a recorded flight."""
         self._clock, self._put = clock, put
         self.started = False  # the autopilot has published its first message
+        self._early: list[OperatorCommand] = []  # to send at its start
         self._last = 0
         self._waiting: dict[int, tuple[OnAcknowledgement, Instant, str]] = {}
 
@@ -36,6 +37,7 @@ class CommandQueue:
         values: Sequence[float] = (),
         text: str = "",
         items: Sequence[Any] = (),
+        surely_accepted: bool = False,
     ) -> None:
         """Send a command; see `OperatorCommand` for its fields.
 
@@ -46,7 +48,14 @@ class CommandQueue:
             values: numeric arguments.
             text: text argument.
             items: mission items.
+            surely_accepted: True if the autopilot accepts it in every state; before the start it is acknowledged at
+                once and sent at the start.
         """
+        if surely_accepted and self._put and not self.started and len(self._early) < MAX_WAITING:
+            self._early.append(OperatorCommand(kind, source, 0, tuple(float(v) for v in values), text, tuple(items)))
+            if on_acknowledgement:
+                on_acknowledgement(CommandAck(result=mavlink.MAV_RESULT_ACCEPTED, value=values[0]))
+            return
         if self._put is None or not self.started or len(self._waiting) >= MAX_WAITING:
             if on_acknowledgement:
                 on_acknowledgement(_rejection(self._rejection_reason()))
@@ -55,6 +64,15 @@ class CommandQueue:
         if on_acknowledgement:
             self._waiting[self._last] = on_acknowledgement, self._clock.now, source
         self._put(OperatorCommand(kind, source, self._last, tuple(float(v) for v in values), text, tuple(items)))
+
+    def start(self) -> None:
+        """Send the commands that waited for the start of the autopilot; called with each of its messages."""
+        if self.started:
+            return
+        self.started = True
+        for command in self._early:
+            self.put(command.kind, command.source, None, command.values, command.text, command.items)
+        self._early.clear()
 
     def _rejection_reason(self) -> str:
         """Return the reason for rejecting a command now."""

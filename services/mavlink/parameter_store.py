@@ -131,7 +131,7 @@ class ParameterStore:
             self._reject(endpoint, name, BY_NAME, mavlink.MAV_PARAM_ERROR_VALUE_OUT_OF_RANGE)
             self._send(endpoint, name)
         else:
-            self._commands.put("parameter", endpoint.name, on_acknowledgement, (requested,), name)
+            self._request(endpoint, name, requested, on_acknowledgement)
 
     def _set_fact(self, endpoint: Endpoint, fact: Fact, value: float, trusted: bool) -> None:
         """Set the counterparts of a fact, one after another."""
@@ -168,7 +168,12 @@ class ParameterStore:
                 self._announce(fact.name)
 
         for name, v in list(pending.items()):
-            self._commands.put("parameter", endpoint.name, partial(on_acknowledgement, name), (v,), name)
+            self._request(endpoint, name, v, partial(on_acknowledgement, name))
+
+    def _request(self, endpoint: Endpoint, name: str, value: float, on_acknowledgement: Callable[[Any], None]) -> None:
+        """Request a value from the autopilot, at its start if it has not started."""
+        allowed = self._table[name].allows(value)
+        self._commands.put("parameter", endpoint.name, on_acknowledgement, (value,), name, surely_accepted=allowed)
 
     def _announce(self, name: str) -> None:
         """Send a changed parameter to every endpoint, and again at the next step."""

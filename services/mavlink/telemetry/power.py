@@ -10,6 +10,7 @@ from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
 PULSE_MIN, PULSE_SPAN = 1000.0, 1000.0  # [us] of a servo signal at no and at full voltage
+PULSE_STOPPED = 900.0  # [us] of a motor that is switched off, as in PX4's simulation
 OUTPUTS, ACTUATORS_MAX = 8, 32  # outputs in SERVO_OUTPUT_RAW and ACTUATOR_OUTPUT_STATUS
 CELLS, MORE_CELLS = 10, 4  # cells in the two lists of BATTERY_STATUS
 EMPTY = 0xFFFF  # absent cell of the first list; in the second list it is 0
@@ -41,7 +42,12 @@ def servo_output(v: VehicleCache) -> Any:
 @stream("ACTUATOR_OUTPUT_STATUS", 0.0, 10.0)
 def actuator_outputs(v: VehicleCache) -> Any:
     """Return the motor commands as pulse widths, up to 32."""
-    pulses = [PULSE_MIN + PULSE_SPAN * fraction for fraction in motor_fractions(v)[:ACTUATORS_MAX]]
+
+    def pulse(motor: int, fraction: float) -> float:
+        is_off = fraction == 0.0 and (not v.status.armed or motor == v.status.failed_motor)
+        return PULSE_STOPPED if is_off else PULSE_MIN + PULSE_SPAN * fraction
+
+    pulses = [pulse(k, fraction) for k, fraction in enumerate(motor_fractions(v)[:ACTUATORS_MAX], 1)]
     if not pulses:
         return None
     active = (1 << len(pulses)) - 1

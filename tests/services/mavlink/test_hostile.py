@@ -3,6 +3,7 @@
 import random
 import socket
 import time
+from collections import Counter
 
 import pytest
 from adapter_harness import Bench, item
@@ -11,7 +12,8 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 from lapwing.services.common.mavlink.dialect import mavlink
-from lapwing.services.mavlink.links.link import MAX_RATE
+from lapwing.services.mavlink.channel import Channel
+from lapwing.services.mavlink.links.link import MAX_RATE, PIECE
 from lapwing.services.mavlink.protocols import handlers
 from lapwing.services.mavlink.protocols.commands import READ_ONLY, RULES
 
@@ -239,3 +241,28 @@ def test_number_of_endpoints_is_limited():
         assert len(running.hub.adapter.sessions) == 8
         for s in sockets:
             s.close()
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_first_command_after_garbage_in_a_stream_is_answered(seed):
+    """Without resynchronisation a marker in the garbage swallows up to 280 bytes of the commands behind it."""
+    counts, codec = Counter(), mavlink.MAVLink(None, 255, 190)
+    channel = Channel((1, 1), None, False, counts, strict=True)
+    heartbeat = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3).pack(codec)
+    assert len(list(channel.decode(heartbeat))) == 1
+    garbage = random.Random(seed).randbytes(23_000)
+    for begin in range(0, len(garbage), PIECE):
+        assert not list(channel.decode(garbage[begin : begin + PIECE]))
+    for _ in range(3):
+        frame = mavlink.MAVLink_param_request_read_message(1, 1, b"MPC_XY_P", -1).pack(codec)
+        got = [m for part in (frame[:7], frame[7:]) for m in channel.decode(part)]
+        assert [m.get_type() for m in got] == ["PARAM_REQUEST_READ"]
+    assert counts["not MAVLink"]
+
+
+def test_frames_behind_a_false_marker_in_the_same_piece_are_read():
+    codec = mavlink.MAVLink(None, 255, 190)
+    channel = Channel((1, 1), None, False, Counter())
+    frame = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3).pack(codec)
+    for false_start in (b"\xfe\x09\0\0\0\0", b"\xfd\x40\0\0\0\0\0\0\0\0", b"\xfd\x40\0\0\0\0\0\xff\xff\xff", b"\xfd\xfe\xfd"):
+        assert len(list(channel.decode(frame + false_start + 10 * frame))) == 11

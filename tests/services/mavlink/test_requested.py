@@ -133,6 +133,20 @@ def test_motors_and_their_outputs():
     assert m.actuator[4] == 0.0
 
 
+def test_stopped_motors_have_the_pulse_of_px4():
+    bench, station = followed()
+    running = bench.vehicle.more
+    for armed, failed, voltages, pulses in (
+        (False, 0, (0.0,) * 4, [900.0] * 4),
+        (True, 0, (0.0,) * 4, [1000.0] * 4),
+        (True, 2, (0.0,) * 4, [1000.0, 900.0, 1000.0, 1000.0]),
+    ):
+        bench.vehicle.armed, bench.vehicle.status = armed, {"failed_motor": failed}
+        bench.vehicle.more = [*running, (ACTUATORS, Actuators(motor_voltage=voltages))]
+        bench.step(2)
+        assert request(bench, station, "ACTUATOR_OUTPUT_STATUS").actuator[:4] == pulses
+
+
 def test_odometry_has_variances_of_estimator_in_ned():
     bench = Bench()
     bench.vehicle.position = [1.0, 2.0, 3.0]

@@ -38,3 +38,25 @@ def test_commands_are_temporarily_rejected():
     assert station.last("COMMAND_ACK").result == mavlink.MAV_RESULT_TEMPORARILY_REJECTED
     bench.step()
     assert station.command(400, 1.0) == mavlink.MAV_RESULT_ACCEPTED
+
+
+def test_parameter_set_during_start_is_acknowledged_and_reaches_autopilot():
+    """PX4's parameters can be set from its first heartbeat; its client tests do so."""
+    bench = Bench(starting=True)
+    station = bench.station()
+    station.send("param_set", 1, 1, b"MIS_TAKEOFF_ALT", 7.5, mavlink.MAV_PARAM_TYPE_REAL32)
+    assert station.last("PARAM_VALUE").param_value == 7.5
+    assert station.last("PARAM_ERROR") is None
+    assert "parameter" not in bench.vehicle.kinds
+    bench.step(2)
+    assert bench.vehicle.parameters["MIS_TAKEOFF_ALT"] == 7.5
+
+
+def test_invalid_parameter_is_rejected_during_start():
+    bench = Bench(starting=True)
+    station = bench.station()
+    station.send("param_set", 1, 1, b"MIS_TAKEOFF_ALT", 1e6, mavlink.MAV_PARAM_TYPE_REAL32)
+    assert station.last("PARAM_ERROR")
+    assert station.last("PARAM_VALUE").param_value < 1e6
+    bench.step(2)
+    assert "parameter" not in bench.vehicle.kinds
