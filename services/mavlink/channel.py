@@ -126,7 +126,7 @@ class Channel:
         return message
 
     def _resume_in(self, rejected: bytes) -> None:
-        """Continue in a stream with the first possible frame behind the marker of rejected bytes, the last ones read."""
+        """Continue in a stream with the first possible frame behind the marker of rejected bytes, just read."""
         codec = self._codec
         if self._datagrams:
             return

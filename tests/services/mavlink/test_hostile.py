@@ -264,5 +264,6 @@ def test_frames_behind_a_false_marker_in_the_same_piece_are_read():
     codec = mavlink.MAVLink(None, 255, 190)
     channel = Channel((1, 1), None, False, Counter())
     frame = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3).pack(codec)
-    for false_start in (b"\xfe\x09\0\0\0\0", b"\xfd\x40\0\0\0\0\0\0\0\0", b"\xfd\x40\0\0\0\0\0\xff\xff\xff", b"\xfd\xfe\xfd"):
+    unknown = b"\xfd\x40\0\0\0\0\0\xff\xff\xff"
+    for false_start in (b"\xfe\x09\0\0\0\0", b"\xfd\x40\0\0\0\0\0\0\0\0", unknown, b"\xfd\xfe\xfd"):
         assert len(list(channel.decode(frame + false_start + 10 * frame))) == 11
