@@ -10,7 +10,7 @@ from typing import Any
 from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram, Service
 from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
 from lapwing.kernels import math
-from lapwing.kernels.cell import Cell, write
+from lapwing.kernels.cell import Cell, read, write
 from lapwing.messages import CommandAcks, header
 from lapwing.messages import topics as topic
 from lapwing.services.autopilot import motor_failure
@@ -28,28 +28,14 @@ from lapwing.services.autopilot.land_detector import LANDED, ON_GROUND
 from lapwing.services.autopilot.mixer import airmode
 from lapwing.services.autopilot.px4 import law as px4_law
 from lapwing.services.autopilot.service_config import AutopilotSetup
+from lapwing.services.autopilot.text_table import TextTable
 from lapwing.services.common import ports
 from lapwing.services.common.autopilot_parameters import PX4_CASCADE, with_gains
+from lapwing.services.common.failure_types import SOUND
 from lapwing.services.common.operator_inbox import merge_commands
 from lapwing.services.common.ports import ImuSelection, Setpoint
 
 Operator = Callable[[int], Iterable[Any]]
-
-
-class TextTable:
-    """Growing table of texts with an index."""
-
-    def __init__(self, texts: Iterable[Any] = ()):
-        """Create a table that starts with `texts`."""
-        self.table = list(texts)
-        self._number = {text: i for i, text in enumerate(self.table)}
-
-    def number(self, text: Any) -> int:
-        """Return the index of a text; append it if it is new."""
-        if text not in self._number:
-            self._number[text] = len(self.table)
-            self.table.append(text)
-        return self._number[text]
 
 
 class CommanderBlock:
@@ -97,6 +83,7 @@ class CommanderBlock:
         )  # fmt: skip
         self._commander = Commander(constants)
         self._injection = injection
+        self._motor_failures = (SOUND,) * len(a.rotor_x)  # injected ones
         self._battery = injection.received(ports.BATTERY)
         self.phases = TextTable(config.phases)
         self.status_texts = TextTable([_status_fields(self._commander.initial_status())])
@@ -152,6 +139,7 @@ class CommanderBlock:
                 write(self._px4, px4_law.build(output.parameters, self._config.airframe))
         if output.faults is not None and self._injection.faults is not None:
             write(self._injection.faults, output.faults)
+            self._forget_failed_motor(output.faults.motors, flight.failed_motor)
         if self._injection.direct is not None and output.motor_voltage != self._direct_voltages:
             self._direct_voltages = output.motor_voltage
             write(self._injection.direct, self._direct(output.motor_voltage))
@@ -182,6 +170,12 @@ class CommanderBlock:
     def _flight(self, tick: int) -> Flight:
         flight: Flight = self._graph.latest(FLIGHT, tick - 1) if tick > 0 else Flight()
         return flight
+
+    def _forget_failed_motor(self, failures: tuple[int, ...], failed: int) -> None:
+        """Make the detector forget a failed motor whose injected failure has ended, until the next injection."""
+        before, self._motor_failures = self._motor_failures, failures
+        ended = failed > 0 and before[failed - 1] != SOUND and failures[failed - 1] == SOUND
+        write(self._detector, read(self._detector)._replace(repaired=failed if ended else 0))
 
     def _imu_selection(self, tick: int) -> ImuSelection:
         voted = self._config.imus > 1 and tick > 0

@@ -34,6 +34,7 @@ class Parameters(NamedTuple):
     hover_thrust: float  # thrust of each rotor [N]
     gravity: float  # [m/s^2]
     enabled: bool  # False: no failure is detected
+    repaired: int = 0  # number of a rotor whose injected failure has ended, from 1; 0: none
 
 
 class State(NamedTuple):
@@ -130,7 +131,7 @@ def step(p: Parameters, s: State, dt: float, e: StateEstimate, height: float, co
         thrust = root[k] * root[k]
         ax += p.roll_arm[k] * thrust / ix
         ay += p.pitch_arm[k] * thrust / iy
-    before = s.failed if p.enabled else 0
+    before = s.failed if p.enabled and s.failed != p.repaired else 0
     # the ground may be higher than at the start
     is_impact = excess(p, root, e.attitude, e.acceleration_world) > IMPACT
     pause = PAUSE if is_impact else max(s.pause - dt, 0.0)

@@ -223,6 +223,27 @@ def test_each_of_six_motors_can_fail():
     assert height(flight, 6.9) > 2.0
 
 
+def test_repaired_motor_returns_to_the_allocation():
+    """PX4's client tests switch each motor off for a second and on again."""
+    script = {0.04: [command("takeoff", 3.0), command("arm")]}
+    for k in range(1, 7):
+        script[5.0 + k] = [inject("motor", OFF, k, id=10 + k)]
+        script[5.5 + k] = [inject("motor", SOUND, k, id=20 + k)]
+    overrides = [
+        ENABLED,
+        *OPERATED,
+        "run.duration=13",
+        "autopilot.estimator=ground_truth",
+        "effects.rotor_damage.time=99.0",
+    ]
+    flight = memory_log.fly(load("hexacopter", overrides), scripted(script))
+    for k in range(1, 7):
+        assert at(flight, "status", 5.4 + k, lambda m: m.failed_motor) == k
+        assert at(flight, "status", 5.9 + k, lambda m: m.failed_motor) == 0
+    assert voltages(flight, 12.9).min() > 1.0
+    assert abs(height(flight, 13.0) - 3.0) < 1.0
+
+
 def test_lost_gps_descends_then_holds_on_recovery():
     script = {14: [inject("gps", OFF)], 27: [inject("gps", SOUND, id=8)]}
     flight = fly_by_sensors(
