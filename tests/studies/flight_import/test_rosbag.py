@@ -11,7 +11,7 @@ from flight_writers import GRAVITY, INTERVAL, SAMPLES
 from lapwing.studies.flight_import.open_flight import open_flight
 
 
-def write_bag(path, topics):
+def write_bag(path, topics, storage="MCAP"):
     """Write a bag of messages (type, make(k, header)) by topic and number of messages per sample."""
     from rosbags.rosbag2 import StoragePlugin, Writer
     from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -21,7 +21,7 @@ def write_bag(path, topics):
     text = "std_msgs/Header header\nfloat64[] position\nfloat64[] velocity\nfloat64[] normalized\n"
     types.register(get_types_from_msg(text, "actuator_msgs/msg/Actuators"))
     make = SimpleNamespace(**{name.rsplit("/", 1)[1]: kind for name, kind in types.types.items()})
-    with Writer(path, version=9, storage_plugin=StoragePlugin.MCAP) as writer:
+    with Writer(path, version=9, storage_plugin=StoragePlugin[storage]) as writer:
         for topic, (kind, count, content) in topics.items():
             connection = writer.add_connection(topic, kind, typestore=types)
             for k in range(count * SAMPLES):
@@ -97,6 +97,25 @@ def test_bag_of_several_vehicles_needs_a_name(tmp_path):
     result = open_flight(tmp_path / "bag", vehicle="blue")
     assert result.position[:, 2] == pytest.approx(5.0)
     assert "/red/imu" in result.unknown
+
+
+@pytest.mark.long
+def test_command_imports_database_with_and_without_metadata(tmp_path):
+    write_bag(tmp_path / "bag", {**BAG, "/mavros/rc/out": ("mavros_msgs/msg/RCOut", 1, pulses)}, "SQLITE3")
+    (file,) = (tmp_path / "bag").glob("*.db3")
+    heights = []
+    for source in (tmp_path / "bag", file, file):
+        command = [sys.executable, "-m", "lapwing", "import", source, "--out", tmp_path / f"{len(heights)}.mcap"]
+        done = subprocess.run(command, capture_output=True, text=True)
+        assert done.returncode == 0, done.stderr
+        heights.append(open_flight(command[-1]).position[:, 2])
+        (tmp_path / "bag" / "metadata.yaml").unlink(missing_ok=True)
+    assert heights[0] == pytest.approx(2.0)
+    assert all(np.array_equal(each, heights[0], equal_nan=True) for each in heights)
+    file.write_bytes(file.read_bytes()[:8192])
+    refused = subprocess.run(command, capture_output=True, text=True)
+    assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
+    assert f"{file.name}: is not a readable rosbag2" in refused.stderr
 
 
 @pytest.mark.long
