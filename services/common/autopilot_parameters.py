@@ -25,9 +25,10 @@ HEIGHT_SENSORS = ("barometer", "gps", "sonar")
 """Sensor of each value of EKF2_HGT_REF."""
 _LEVELS = "1 low, 2 critical, 3 nearly empty"
 _HEIGHTS = "0 barometer, 1 GPS, 2 distance sensor, above the ground"
-NOTHING, HOLD, RETURN, LAND, DESCEND = 0, 1, 2, 3, 4  # failsafe actions
+NOTHING, HOLD, RETURN, LAND, DESCEND, TERMINATE = 0, 1, 2, 3, 4, 5  # failsafe actions
 _AIRMODES = "0 nothing: roll and pitch are reduced, 1 roll and pitch, 2 roll, pitch and yaw"
 _ACTION = "0 warning, 1 hold, 2 return, 3 land, 4 descend (needs no position)"
+_TERMINATE = "5 terminate (stops the motors)"
 
 
 class Parameter(NamedTuple):
@@ -100,7 +101,7 @@ _FAILSAFES = (
     Parameter("FS_BAT_CRIT_ACT", "", RETURN, 0, 4, f"action on a critical battery: {_ACTION}", True),
     Parameter("BAT_EMERGEN_THR", "", 0.05, 0.0, 0.5, "charge below which the battery is nearly empty"),
     Parameter("FS_BAT_EMER_ACT", "", LAND, 0, 4, f"action on a nearly empty battery: {_ACTION}", True),
-    Parameter("FS_MOTOR_ACT", "", LAND, 0, 4, f"action on a motor failure: {_ACTION}", True),
+    Parameter("FS_MOTOR_ACT", "", LAND, 0, 5, f"action on a motor failure: {_ACTION}, {_TERMINATE}", True),
     Parameter(
         "COM_POS_FS_DELAY", "s", 10.0, 0.1, 100.0, "time without GPS or a certain position after which it is lost"
     ),
@@ -114,7 +115,7 @@ _FAILSAFES = (
     Parameter("MC_AIRMODE", "", 1, 0, 2, f"the collective rises for {_AIRMODES}", True),
     Parameter("SIM_GPS_USED", "", 16, 0, 50, "satellites of the simulated GPS; below 4 it has no fix", True),
     Parameter("SYS_FAIL_BAT_LVL", "", 2, 1, 3, f"charge that a wrong battery reports: {_LEVELS}", True),
-    Parameter("FS_FENCE_ACT", "", RETURN, 0, 4, f"action outside the fence: {_ACTION}", True),
+    Parameter("FS_FENCE_ACT", "", RETURN, 0, 5, f"action outside the fence: {_ACTION}, {_TERMINATE}", True),
     Parameter("GF_MAX_HOR_DIST", "m", 0.0, 0.0, 10000.0, "horizontal distance from home of the fence; 0: none"),
     Parameter("GF_MAX_VER_DIST", "m", 0.0, 0.0, 10000.0, "height above home of the fence; 0: none"),
 )

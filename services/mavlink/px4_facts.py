@@ -57,11 +57,11 @@ INTERNAL_COMPASS, NO_COLLISION_PREVENTION = -1, -1  # CAL_MAG0_ROT, CP_DIST
 NO_SWITCHES = ("MODE_SW", "FLTMODE", "RETURN_SW", "LOITER_SW", "OFFB_SW", "KILL_SW", "ARM_SW", "GEAR_SW", "TRANS_SW")
 NO_THRESHOLDS = ("ARMSWITCH", "GEAR", "KILLSWITCH", "LOITER", "OFFB", "RETURN")
 THRESHOLD = 0.75  # PX4's default
-NOTHING, HOLD, RETURN, LAND, DESCEND = range(5)  # failsafe actions of the autopilot
+NOTHING, HOLD, RETURN, LAND, DESCEND, TERMINATE = range(6)  # failsafe actions of the autopilot
 _WARN, _LAND, _RETURN_THEN_LAND = 0, 2, 3  # COM_LOW_BAT_ACT
-# PX4's actions that the autopilot has; it has no termination
-_GEOFENCE = {1: NOTHING, 0: NOTHING, 2: HOLD, 3: RETURN, 5: LAND}  # GF_ACTION
-_MOTOR_LOSS = {0: NOTHING, 1: HOLD, 2: LAND, 3: RETURN}  # COM_ACT_FAIL_ACT
+# the autopilot's actions by PX4's
+_GEOFENCE = {1: NOTHING, 0: NOTHING, 2: HOLD, 3: RETURN, 4: TERMINATE, 5: LAND}  # GF_ACTION
+_MOTOR_LOSS = {0: NOTHING, 1: HOLD, 2: LAND, 3: RETURN, 4: TERMINATE}  # COM_ACT_FAIL_ACT
 _DESCENT = {"GF_ACTION": 5, "COM_ACT_FAIL_ACT": 2}  # to show DESCEND as landing
 _BATTERY = {  # COM_LOW_BAT_ACT: actions at the critical and at the emergency charge
     _WARN: (NOTHING, NOTHING),

@@ -1,15 +1,15 @@
-"""Failsafes: hold, return, land or descend after a loss, by parameters."""
+"""Failsafes: hold, return, land, descend or terminate after a loss, by parameters."""
 
 from collections.abc import Callable
 from typing import NamedTuple
 
 from lapwing.kernels import math
 from lapwing.services.autopilot.commander.commander_state import FailsafeTimer, State
-from lapwing.services.autopilot.commander.transitions import Context, enter
+from lapwing.services.autopilot.commander.transitions import Context, disarm, enter
 from lapwing.services.common import status_texts
-from lapwing.services.common.autopilot_parameters import DESCEND, HOLD, LAND, RETURN
+from lapwing.services.common.autopilot_parameters import DESCEND, HOLD, LAND, RETURN, TERMINATE
 
-_MODES = {HOLD: "hold", RETURN: "return", LAND: "land", DESCEND: "descend"}
+_MODES = {HOLD: "hold", RETURN: "return", LAND: "land", DESCEND: "descend", TERMINATE: "terminate"}
 _SEVERITY = ("hold", "return", "land", "descend")  # a failsafe never replaces a more severe one
 _MANUAL = ("position_control", "altitude_control", "stabilized", "acro")
 _EXEMPTION = {"mission": 1, "offboard": 4} | dict.fromkeys(_MANUAL, 0)  # bit of COM_RCL_EXCEPT by mode
@@ -102,6 +102,11 @@ def _act(context: Context, reason: str, mode: str | None) -> bool:
     state = context.state
     if mode is None:
         context.outbox.send_text(reason)
+        return True
+    if mode == "terminate":
+        if state.on_trajectory:
+            enter(context.constants, state, "hold")
+        disarm(context, reason)
         return True
     if mode == "descend" and state.guidance.sticks_fresh:
         mode = "altitude_control"  # a pilot holds the sticks

@@ -175,6 +175,13 @@ def test_weak_motor_is_detected_and_vehicle_lands_upright():
     assert not at(flight, "status", 16.0, lambda m: m.armed)
 
 
+def test_motor_failure_can_stop_the_motors():
+    flight = fly(7.5, UP | {6: [inject("motor", OFF, 3)]}, ENABLED, "autopilot.parameters.FS_MOTOR_ACT=5")
+    assert "disarmed: a motor has failed" in sent_texts(flight)
+    assert not at(flight, "status", 6.5, lambda m: m.armed)
+    assert set(voltages(flight, 6.5).ravel()) == {0.0}
+
+
 def test_slow_motor_follows_every_twentieth_command():
     flight = fly(8, UP | {6: [inject("motor", SLOW)], 6.2: [command("goto", 0.0, 0.0, 3.3)]}, ENABLED)
     changes = np.flatnonzero(np.diff(voltages(flight, 6.3)[:, 0]) != 0.0)

@@ -159,6 +159,8 @@ def set_whole(bench, station, name, value):
         ("COM_LOW_BAT_ACT", 2, {"FS_BAT_CRIT_ACT": 3, "FS_BAT_EMER_ACT": 3}),
         ("COM_ACT_FAIL_ACT", 3, {"FS_MOTOR_ACT": 2}),
         ("COM_ACT_FAIL_ACT", 1, {"FS_MOTOR_ACT": 1}),
+        ("COM_ACT_FAIL_ACT", 4, {"FS_MOTOR_ACT": 5}),
+        ("GF_ACTION", 4, {"FS_FENCE_ACT": 5}),
         ("RTL_APPR_FORCE", 1, {}),
     ],
 )
@@ -173,7 +175,7 @@ def test_px4_parameter_sets_its_counterparts(name, value, counterparts):
 
 
 @pytest.mark.parametrize(
-    ("name", "value"), [("GF_ACTION", 4), ("COM_LOW_BAT_ACT", 1), ("COM_ACT_FAIL_ACT", 4), ("RTL_APPR_FORCE", 2)]
+    ("name", "value"), [("GF_ACTION", 6), ("COM_LOW_BAT_ACT", 1), ("COM_ACT_FAIL_ACT", 5), ("RTL_APPR_FORCE", 2)]
 )
 def test_px4_value_without_counterpart_is_rejected(name, value):
     bench = Bench()
