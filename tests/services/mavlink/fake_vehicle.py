@@ -40,7 +40,7 @@ PARAMETERS = (
     Parameter("SYS_FAILURE_EN", "", 1.0, 0.0, 1.0, "", True),
     Parameter("NAV_DLL_ACT", "", 2.0, 0.0, 3.0, "", True),
     *[
-        Parameter(name, "", value, 0.0, 4.0, "", True)
+        Parameter(name, "", value, 0.0, 5.0, "", True)
         for name, value in (
             *(("FS_FENCE_ACT", 2.0), ("FS_BAT_CRIT_ACT", 2.0)),
             *(("FS_BAT_EMER_ACT", 3.0), ("FS_MOTOR_ACT", 3.0)),
