@@ -39,6 +39,17 @@ def warn_of_gains(scene: "Scene") -> None:
             typer.echo(f"lapwing: warning: {prefix}{line}", err=True)
 
 
+def warn_of_round_off(scene: "Scene") -> None:
+    """Print a warning for each vehicle whose substeps in contact reach round-off before its accuracy."""
+    from lapwing.services.plant.schema import Solver, limited_by_round_off
+
+    for vehicle in scene.vehicles or (scene,):
+        if limit := limited_by_round_off(vehicle):
+            (name, least), accuracy = limit, vehicle[Solver].accuracy
+            message = f"substeps of {name} are limited by round-off, and {accuracy:g} may be missed in contact"
+            typer.echo(f"lapwing: warning: solver.accuracy: {message}; use at least {least:g}", err=True)
+
+
 def check_firmware_program(scene: "Scene") -> None:
     """Raise ConfigError if `autopilot.command` or `autopilot.directory` names no program or folder on this machine."""
     from lapwing.dynamics.config_error import ConfigError

@@ -21,7 +21,7 @@ from lapwing.cli.output_paths import (
     remove_on_failure,
     reserve_log,
 )
-from lapwing.cli.preflight import check_firmware_program, warn_of_gains, with_solver_selected
+from lapwing.cli.preflight import check_firmware_program, warn_of_gains, warn_of_round_off, with_solver_selected
 from lapwing.cli.run_options import MULTI_PROCESS, SINGLE_PROCESS, RunOptions
 from lapwing.cosim.processes.child_process import Child, start_early
 
@@ -48,6 +48,7 @@ def run(options: RunOptions) -> None:
         if not options.external:
             check_firmware_program(scene)
         warn_of_gains(scene)
+        warn_of_round_off(scene)
         spec = _spec(options, scene)
         flights = _fly_and_report(options, scene, spec, early)
         if flights:

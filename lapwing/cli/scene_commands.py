@@ -9,7 +9,7 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.options import Overrides
 from lapwing.cli.output_paths import claim
-from lapwing.cli.preflight import warn_of_gains, with_solver_selected
+from lapwing.cli.preflight import warn_of_gains, warn_of_round_off, with_solver_selected
 
 if TYPE_CHECKING:
     from lapwing.cosim.config.run_config import RunConfig
@@ -78,6 +78,7 @@ def check(
         exchange, lines = loaded[Communication], [("title", loaded[Run].title or loaded.name)]
         typer.echo(f"{scene}: ok")
         warn_of_gains(loaded)
+        warn_of_round_off(loaded)
         for each in loaded.vehicles or (loaded,):
             vehicle = each[Vehicle]
             lines += [

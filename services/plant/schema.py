@@ -10,10 +10,14 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vehicles.multirotor import CONTACT_TOLERANCE
 from lapwing.kernels import math
 from lapwing.services.common.communication_schema import Communication
+from lapwing.services.common.vehicle_schema import Vehicle
 
 CONTACT_SHARE = 3e-5  # of solver.accuracy, for a substep in contact: bounces amplify its errors
 MANY_SUBSTEPS = 1e-4  # accuracy below which the share decreases with the number of substeps, as its fifth root
 LEAST_CONTACT_TOLERANCE = 1e-15  # below it a difference of two substeps is round-off, and no substep is short enough
+
+# accuracies below which substeps are limited by round-off, by effect or model
+LEAST_ACCURACIES = {"ground_contact": 4e-10, "unloading": 3.4e-8, "shared_slung_load": 1.3e-7}
 
 PART_SHARE, PART_TOLERANCE = 3e-5, 1e-5  # for systems with their own contacts; tolerance without an accuracy
 
@@ -79,6 +83,16 @@ def accuracy_to_select_for(scene: Scene) -> float | None:
     """Return the smallest accuracy of a scene's vehicles; None if one of them sets a step, or no accuracy."""
     solvers = [vehicle[Solver] for vehicle in scene.vehicles or (scene,)]
     return min(s.accuracy or math.inf for s in solvers) if all(s.undecided for s in solvers) else None
+
+
+def limited_by_round_off(scene: Scene) -> tuple[str, float] | None:
+    """Return (name, accuracy) of the part of a vehicle that cannot meet its accuracy in contact; None if all can."""
+    names = {*scene.tables("effects"), scene[Vehicle].model}
+    name = max(names & LEAST_ACCURACIES.keys(), key=LEAST_ACCURACIES.__getitem__, default=None)
+    accuracy = scene[Solver].accuracy
+    if name is None or accuracy is None or accuracy >= LEAST_ACCURACIES[name]:
+        return None
+    return name, LEAST_ACCURACIES[name]
 
 
 def method(scene: Scene) -> tuple[tuple, int, float]:

@@ -14,7 +14,7 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.scene import KeyOrigin, Scene, SceneError, with_values
 from lapwing.services.common.communication_schema import Communication
-from lapwing.services.plant.schema import Solver
+from lapwing.services.plant.schema import LEAST_ACCURACIES, Solver
 from lapwing.services.process_table import foreign_firmware
 from lapwing.services.scene_resolver import from_resolved, load, resolve
 from lapwing.studies.accuracy.open_loop import PART_LENGTH, fly_parts, inputs_of_plant
@@ -25,7 +25,7 @@ from lapwing.studies.simulate import fly_with_ports
 
 FINER = 8  # factor of the number of steps in the finer flight
 STRICTER = 1e-3  # factor of the accuracy in contact
-STRICTEST = 1e-10  # limit of the accuracy in contact by round-off
+STRICTEST = LEAST_ACCURACIES["ground_contact"]  # limit of the accuracy in contact by round-off
 MISSING = "missing; set the error to compare with, e.g. --set solver.accuracy=1e-4"
 WorkFunction = Callable[[Callable[[int], None]], Any]  # flies, and calls its argument with the current tick
 Progress = Callable[

@@ -31,10 +31,11 @@ def show(console: Console, result: FlightAccuracy) -> None:
 def _table(result: FlightAccuracy) -> Table:
     fleet = _is_fleet(result)
     closed_loop = {(q.vehicle, q.name): q for q in result.closed_loop.quantities} if result.closed_loop else {}
-    table = Table(box=SIMPLE, pad_edge=False, padding=(0, 0) if fleet and closed_loop else (0, 1))  # within 80 columns
-    names = ["quantity", "solver error" if result.part_length else "largest error", "error / accuracy", "at (s)"]
+    table = Table(box=SIMPLE, pad_edge=False, padding=(0, 0) if closed_loop else (0, 1))  # within 80 columns
+    names = ["solver error" if result.part_length else "largest error", "/ accuracy", "at (s)"]
+    table.add_column("quantity", no_wrap=True)
     for name in [*names, *(["closed loop", "at (s)"] if closed_loop else [])]:
-        table.add_column(name, justify="left" if name == "quantity" else "right", no_wrap=True)
+        table.add_column(name, justify="right", no_wrap=True, min_width=len(name))
     for q in result.quantities:
         label = f"{q.vehicle}: {q.name}" if fleet else q.name
         cells = [label, f"{q.error:.1e}", f"{q.error / result.accuracy:.2g}", f"{q.time:.3f}"]
@@ -95,7 +96,7 @@ def _remedy(result: FlightAccuracy) -> list[str]:
         return [f"{cause}; remove it to select a step"]
     cause = "solver.step: selected for a gentler flight"
     count = math.ceil((result.worst.error / result.accuracy) ** (1.0 / integrators.get(result.integrator).ORDER))
-    return [f"{cause}; use --set solver.integrator={result.integrator} --set solver.step={result.step / count:g}"]
+    return [f"{cause}; use --set solver.integrator={result.integrator} --set solver.step={result.step / count:.12g}"]
 
 
 def _is_fleet(result: FlightAccuracy) -> bool:

@@ -37,6 +37,7 @@ HEIGHT = 20.0  # [m] clear of the ground
 FINEST = 64  # steps of the reference per communication step; other runs have at most half as many
 EXTENDED = (multirotor, multirotor_slung)  # forms with steps in extended precision
 JUMP, JUMP_INTERVAL = 0.02, 0.4  # [s] duration at a motor's limit; interval of the manoeuvres
+VARIATION = 0.1  # of the voltages of hover, up or down every `JUMP`, in `varying_voltages`
 TICK = 1000  # first tick, after the start of random effects
 TOLERANCE = 1e-12  # of substeps at the limits of motors and flow, so that the errors of the steps remain
 
@@ -65,6 +66,20 @@ def jumping_voltages(p: MultirotorParameters, t: float) -> tuple[float, ...]:
         return (volts,) * len(axis)
     sign = 1.0 if part < JUMP or part >= 3.0 * JUMP else -1.0
     return tuple(layout.max_voltage if sign * arm > 0.0 else 0.0 for arm in axis)
+
+
+def varying_voltages(p: MultirotorParameters, t: float) -> tuple[float, ...]:
+    """Return voltages [V] that jump by a tenth, each motor by itself. See `jumping_voltages` for arguments.
+
+    At a limit of a motor or the flow steps are under error control, so those of `jumping_voltages` do not show the
+    error of steps between limits.
+    """
+    volts, number = hover_speed(p) / p.layout.speed_per_volt, round(t / JUMP - 0.5)
+    signs = (math.copysign(VARIATION, math.sin(13.0 * (number + 1) * (i + 1))) for i in range(len(p.layout.x_body)))
+    return tuple(volts * (1.0 + sign) for sign in signs)
+
+
+MANOEUVRES = (gentle_voltages, jumping_voltages, varying_voltages)
 
 
 @always_inline
@@ -129,12 +144,13 @@ def longest_step(scene: Scene) -> float:
 def problem(scene: Scene, manoeuvre: Voltages = gentle_voltages) -> Problem:
     """Return the multirotor of a scene under the voltages of a manoeuvre as a problem."""
     exchange = scene[Communication]
-    (p, state), longest = physics(scene, manoeuvre is jumping_voltages), longest_step(scene)
+    gentle = manoeuvre is gentle_voltages
+    (p, state), longest = physics(scene, not gentle), longest_step(scene)
     form = model(scene).describe(scene)[0]
     motion = multirotor.initial_state(p).motion  # equal shape for every form of the state
     every = max(1, round(DURATION * exchange.rate / SAMPLES))
     duration = SAMPLES * every * exchange.interval
-    start = 0 if manoeuvre is jumping_voltages else TICK
+    start = TICK if gentle else 0
     voltages = np.array([manoeuvre(p, (start + i) * exchange.interval) for i in range(SAMPLES * every)])
     key = stream_key(scene[Run].seed, scene[Vehicle].name, "plant")
 
@@ -169,8 +185,8 @@ def problem(scene: Scene, manoeuvre: Voltages = gentle_voltages) -> Problem:
         )  # fmt: skip
 
     return Problem(
-        f"{scene.name}: its multirotor in the air under "
-        f"{'jumping' if manoeuvre is jumping_voltages else 'prescribed'} voltages",
+        f"{scene.name}: its multirotor in the air under {'prescribed' if gentle else manoeuvre.__name__.split('_')[0]} "
+        "voltages",
         "s",
         duration,
         [solver_method(name) for name in integrators.compatible_methods(p, state.motion)],

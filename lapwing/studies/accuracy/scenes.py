@@ -35,7 +35,7 @@ def manoeuvres(scene: Scene) -> list[Problem]:
         ValueError: see `problem`.
     """
     if hasattr(plant.model(scene), "describe"):
-        return [plant.problem(scene), plant.problem(scene, plant.jumping_voltages)]
+        return [plant.problem(scene, manoeuvre) for manoeuvre in plant.MANOEUVRES]
     return [_fixed_step_problem(scene, *physics(scene))]
 
 

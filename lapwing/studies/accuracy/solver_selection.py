@@ -15,13 +15,14 @@ from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Effects, Vehicle
 from lapwing.services.plant.schema import Solver, accuracy_to_select_for
-from lapwing.studies.accuracy import scenes
-from lapwing.studies.accuracy.work_precision import Point, cheapest, measure
+from lapwing.studies.accuracy import plant, scenes
+from lapwing.studies.accuracy.work_precision import FINE_ENOUGH, Point, cheapest, measure
 from lapwing.studies.complete_file import complete_file
 
 CANDIDATES = ("rkmk2", "rk4_renormalised", "rkmk54", "rk8_renormalised")  # each the cheapest for some system and error
 IMPACT_SHARE = 3e-3  # of the accuracy, because an impact amplifies position errors to 300 times larger velocity errors
 JUMP_SHARE = 0.125  # of the accuracy while voltages jump, because the largest error of such flights is 7 times larger
+HIDDEN = 2.0  # factor by which a finer step errs more if the longer one is under error control
 
 
 def overrides(scene: Scene, notify: Callable[[str], None]) -> list[str]:
@@ -62,19 +63,36 @@ def _expected_points(scene: Scene, accuracy: float, notify: Callable[[str], None
     """Return the points of one vehicle with the largest errors expected in flight."""
     solver = scene[Solver]
     names = (solver.integrator,) if "integrator" in solver.model_fields_set else CANDIDATES
-    gentle, *jumping = (
+    gentle, *others = (
         [p for p in points if p.method in names or len(names) > 1] for points in _points(scene, names, notify)
     )
-    return _expected_errors(gentle, _share(scene, gentle, accuracy) / accuracy, jumping)
+    return _expected_errors(gentle, _share(scene, gentle, accuracy) / accuracy, others)
 
 
-def _expected_errors(gentle: list[Point], share: float, jumping: list[list[Point]]) -> list[Point]:
-    """Return the points of gentle flight with the largest errors expected in flight."""
-    errors = {(p.method, p.setting): p.error / share for p in gentle}
-    for points in jumping:
-        cached = {(p.method, p.setting): p.error / JUMP_SHARE for p in points}
-        errors = {key: max(error, cached.get(key, math.inf)) for key, error in errors.items()}
-    return [p._replace(error=errors[p.method, p.setting]) for p in gentle]
+def _expected_errors(gentle: list[Point], share: float, others: list[list[Point]]) -> list[Point]:
+    """Return the points of all flights with the largest errors expected in flight; times are those of gentle flight."""
+    flights = [(gentle, share), *((points, JUMP_SHARE) for points in others)]
+    by_key = {(p.method, p.setting): p for points, _ in reversed(flights) for p in points}
+    return [
+        p._replace(error=max(_error(points, p.method, p.setting) / part for points, part in flights))
+        for p in by_key.values()
+    ]
+
+
+def _error(points: list[Point], method: str, step: float) -> float:
+    """Return the error of a step in a flight; infinity if it is unknown.
+
+    A flight is not repeated with finer steps once its error is round-off, so the error of the next longer step is an
+    upper bound. A step with a smaller error than a finer one was under error control, as at the limits of the motors:
+    the flight does not show the error that this step has elsewhere.
+    """
+    errors = {p.setting: p.error for p in points if p.method == method}
+    longer = [setting for setting in errors if setting >= step]
+    if not longer:
+        return math.inf
+    result = errors[min(longer)]
+    hidden = any(errors[setting] > max(HIDDEN * result, FINE_ENOUGH) for setting in errors if setting < step)
+    return math.inf if hidden else result
 
 
 def _share(scene: Scene, points: list[Point], accuracy: float) -> float:
@@ -127,8 +145,10 @@ def _cache_file(scene: Scene, names: tuple[str, ...]) -> Path | None:
     ]
     digest = hashlib.blake2b(source_digest(modules).encode(), digest_size=8)
     run = scene[Run]
+    manoeuvres = [voltages.__name__ for voltages in plant.MANOEUVRES]
     for part in (
         names,
+        manoeuvres,
         run.seed,
         scene[Vehicle].name,
         run.duration,

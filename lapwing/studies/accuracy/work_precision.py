@@ -62,11 +62,14 @@ def _refine(problem: Problem, method: SolverMethod, exact: np.ndarray, longest: 
 
 
 def _refinement_is_useless(errors: list[float]) -> bool:
-    """Return True if further refinement is useless."""
-    if not errors:
+    """Return True if the last errors are round-off: small, or no longer decreasing.
+
+    One small error does not count, because a long step can be under error control, and a finer one not.
+    """
+    if len(errors) < 2:
         return False
-    best = min(errors)
-    return best < FINE_ENOUGH or (best < 1e-8 and len(errors) > 2 and best < min(errors[-2:]))
+    last = errors[-3:]
+    return max(last[-2:]) < FINE_ENOUGH or (len(last) > 2 and last == sorted(last) and last[0] < 1e-8)
 
 
 def drift(problem: Problem, outcome: SolverRun) -> dict[str, float]:

@@ -11,7 +11,10 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from lapwing.studies.accuracy.flight_accuracy import FlightAccuracy
+from lapwing.dynamics.integrators import LEAST_TOLERANCE
+from lapwing.services.plant.schema import LEAST_ACCURACIES, Solver, contact_tolerance
+from lapwing.services.scene_resolver import load
+from lapwing.studies.accuracy.flight_accuracy import ClosedLoop, FlightAccuracy
 from lapwing.studies.accuracy.flight_accuracy_output import show
 from lapwing.studies.accuracy.state_errors import Quantity, differences
 
@@ -86,11 +89,57 @@ def test_closed_loop_meets_accuracy_without_sensor_resolution(tmp_path):
     assert "accuracy met: " in result.stdout
 
 
-@pytest.mark.parametrize(("error", "step"), [(4.1e-4, "0.002"), (1.5e-3, "0.002"), (1.7e-3, "0.00133333")])
+@pytest.mark.parametrize(("error", "step"), [(4.1e-4, "0.002"), (1.5e-3, "0.002"), (1.7e-3, "0.00133333333333")])
 def test_missed_selection_names_step_of_fourth_order(capsys, error, step):
+    """The scene accepts the step: it divides the communication step to 1e-9."""
     quantity = Quantity("a", "velocity", error, 1.0)
     show(Console(), FlightAccuracy(1e-4, "rk4_renormalised", 0.004, 0.0005, True, 2.0, [quantity]))
     assert f"--set solver.integrator=rk4_renormalised --set solver.step={step}\n" in capsys.readouterr().out
+    load("hover", [f"solver.step={step}"])
+
+
+@pytest.mark.parametrize("vehicles", [["a"], ["drone1", "drone2"]])
+def test_table_of_closed_loop_has_all_digits_in_80_columns(capsys, vehicles):
+    quantities = [
+        Quantity(v, name, 6.3e-6, 128.996) for v in vehicles for name in ("battery voltage", "angular velocity of load")
+    ]
+    loop = ClosedLoop(quantities, 1e-8, quantities[0], None, 0.0)
+    show(
+        Console(width=80),
+        FlightAccuracy(1e-4, "rk4_renormalised", 0.001, 1e-4, False, 2.0, quantities[: len(vehicles)], 2.0, loop),
+    )
+    lines = capsys.readouterr().out.splitlines()[1:9]
+    assert sum(line.split()[-5:] == ["6.3e-06", "0.063", "128.996", "6.3e-06", "128.996"] for line in lines) >= 1
+    assert all(word in " ".join(lines) for word in ("solver error", "/ accuracy", "at (s)", "closed loop"))
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("scene", "accuracy", "limit"),
+    [("hover", "1e-11", "ground_contact, 4e-10"), ("unload", "1e-08", "unloading, 3.4e-08"), ("hover", "1e-09", "")],
+)
+def test_accuracy_below_round_off_is_announced(tmp_path, scene, accuracy, limit):
+    step = () if scene == "unload" else SHORT
+    result = check(tmp_path, *step, "--set", f"solver.accuracy={accuracy}", scene=scene)
+    assert result.returncode == 0, result.stderr
+    name, _, least = limit.partition(", ")
+    text = (
+        f"substeps of {name} are limited by round-off, and {accuracy} may be missed in contact; use at least {least}\n"
+    )
+    assert result.stderr == (f"lapwing: warning: solver.accuracy: {text}" if limit else "")
+
+
+@pytest.mark.parametrize("accuracy", LEAST_ACCURACIES.values())
+def test_least_accuracy_has_least_tolerance(accuracy):
+    """The tolerance of substeps is the same for stricter accuracies, and larger for coarser ones."""
+    name = next(key for key, value in LEAST_ACCURACIES.items() if value == accuracy)
+    tolerance = {
+        "ground_contact": contact_tolerance,
+        "shared_slung_load": lambda a: max(contact_tolerance(a), LEAST_TOLERANCE),
+        "unloading": lambda a: Solver(accuracy=a).part_tolerance,
+    }[name]
+    assert tolerance(0.9 * accuracy) == tolerance(1e-12)
+    assert tolerance(1.1 * accuracy) > tolerance(1e-12)
 
 
 @pytest.mark.long

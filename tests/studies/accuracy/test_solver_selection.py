@@ -47,7 +47,7 @@ def test_scene_that_lands_gets_share_for_impacts(overrides, step, measured_title
     """An impact amplifies previous errors; an integrator that cannot reach the share meets the accuracy."""
     points = [Point("rkmk2", 2, "s", 0.002, 9e-4, 1e-5, 1, {}), Point("rk4", 4, "s", 0.004, 2e-6, 1.5e-5, 1, {})]
     exact = [p._replace(error=1e-9) for p in points]
-    monkeypatch.setattr(solver_selection, "measure", lambda problem: exact if "jumping" in problem.title else points)
+    monkeypatch.setattr(solver_selection, "measure", lambda problem: points if "prescribed" in problem.title else exact)
     result = solver_selection.overrides(load(ROOT / "lapwing/scenes/hover.toml", overrides), lambda text: None)
     assert result[1] == f"solver.step={step!r}"
 
@@ -59,6 +59,33 @@ def test_voltages_that_jump_count_with_their_share(accuracy, step, measured_titl
     monkeypatch.setattr(solver_selection, "measure", lambda problem: jumping if "jumping" in problem.title else gentle)
     scene = load(ROOT / "lapwing/scenes/hover.toml", [f"solver.accuracy={accuracy}"])
     assert solver_selection.overrides(scene, lambda text: None)[1] == f"solver.step={step!r}"
+
+
+def test_step_under_error_control_shows_no_error_of_other_flights(measured_titles, monkeypatch):
+    """At 4 ms every step of a motor near its current limit had substeps, with less error than steps of 2 ms."""
+    flights = {
+        "prescribed": {0.004: 2e-12, 0.002: 2e-10, 0.001: 1e-11},
+        "jumping": {0.004: 4e-7, 0.002: 2e-8, 0.001: 1e-9},
+        "varying": {0.004: 4e-9, 0.002: 6e-6, 0.001: 9e-7},
+    }
+
+    def measure(problem):
+        errors = next(errors for name, errors in flights.items() if name in problem.title)
+        return [Point("rk4", 4, "s", h, error, 1.0 / h, 1, {}) for h, error in errors.items()]
+
+    monkeypatch.setattr(solver_selection, "measure", measure)
+    for accuracy, step in (("1e-4", 0.002), ("1e-5", 0.001)):
+        scene = load(ROOT / "lapwing/scenes/hover.toml", [f"solver.accuracy={accuracy}"])
+        assert solver_selection.overrides(scene, lambda text: None)[1] == f"solver.step={step!r}"
+
+
+def test_steps_finer_than_those_of_round_off_can_be_selected(measured_titles, monkeypatch):
+    """A gentle flight of which 4 ms had an error of 2e-12 was not flown with finer steps, so none was selected."""
+    gentle = [Point("rk4", 4, "s", 0.004, 2e-12, 1.0, 1, {})]
+    jumping = [Point("rk4", 4, "s", h, error, 1.0, 1, {}) for h, error in ((0.004, 4e-7), (0.002, 2e-8))]
+    monkeypatch.setattr(solver_selection, "measure", lambda p: gentle if "prescribed" in p.title else jumping)
+    scene = load(ROOT / "lapwing/scenes/hover.toml", ["solver.accuracy=1e-6"])
+    assert solver_selection.overrides(scene, lambda text: None)[1] == "solver.step=0.002"
 
 
 def test_fleet_gets_one_solver_that_each_vehicle_meets(measured_titles, monkeypatch):
