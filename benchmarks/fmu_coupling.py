@@ -61,7 +61,7 @@ class Part:
     def row(self, port: str) -> list[float]:
         """Return the current columns of an output port."""
         own = [v for v in self.variables.values() if v.name.startswith(f"{port}.") and v.causality == "output"]
-        values = {}
+        values: dict[int, Any] = {}
         for kind in {v.type for v in own}:
             references = [v.valueReference for v in own if v.type == kind]
             values |= zip(references, getattr(self.fmu, f"get{kind}")(references), strict=True)
@@ -75,17 +75,18 @@ def _is_output(part: Part, name: str) -> bool:
 def coupled(setup: RunConfig, paths: dict[str, Path], jacobi: bool, ticks: int) -> np.ndarray:
     """Return the columns of `truth` at each tick, shape (ticks, n); the first three are the position [m].
 
-    The FMUs step in the order of `paths`. In a Gauss-Seidel coupling, those without direct feedthrough take their inputs
-    before the first step, as in the run.
+    The FMUs step in the order of `paths`, the plant first. In a Gauss-Seidel coupling, those without direct
+    feedthrough take their inputs before the first step, as in the run.
     """
     parts = [Part(name, path) for name, path in paths.items()]
     for part in parts:
         part.connect(parts)
-    plant = next(part for part in parts if part.name == "plant")
-    for part in parts:  # in the order of execution, so that outputs of tick 0 exist before they are read
+    plant = parts[0]
+    for part in parts:
         part.fmu.enterInitializationMode()
-        if part is not plant:
-            part.set(part.values())
+    for part in parts[1:]:  # in the order of execution; the plant reads the tick before
+        part.set(part.values())
+    for part in parts:
         part.fmu.exitInitializationMode()
     rows = [plant.row("truth")]
     for k in range(ticks - 1):
