@@ -34,6 +34,7 @@ SSP_VERSIONS = {3: "2.0", 2: "1.0"}  # SSP version by version of FMI; SSP 1.0 ha
 _INTERFACES = {
     CO_SIMULATION: "CoSimulation", MODEL_EXCHANGE: "ModelExchange", SCHEDULED_EXECUTION: "ScheduledExecution",
 }  # fmt: skip
+_BOTH_VERSIONS = {"Float64": "Real", "Int32": "Integer"}  # names of types that readers of SSP 1.0 know, too
 _UNTYPED = (CLOCK, "Enumeration")  # the package would need their definitions, which the FMU has
 
 
@@ -169,7 +170,8 @@ def _structure(setup: RunConfig, components: Sequence[_Component], version: str)
         for name, connector in each.connectors.items():
             entry = Xml.SubElement(own, f"{description}Connector", {"name": name, "kind": connector.kind})
             if connector.type not in _UNTYPED:
-                Xml.SubElement(entry, f"{common}{connector.type}")  # without unit: that of the FMU
+                kind = _BOTH_VERSIONS.get(connector.type, connector.type)
+                Xml.SubElement(entry, f"{common}{kind}")  # without unit: that of the FMU
         if each.start:
             component.append(_parameters(each.start, version))
         notes = Xml.SubElement(component, f"{description}Annotations")
