@@ -34,6 +34,7 @@ class Part:
         )  # fmt: skip
         self.fmu.instantiate()
         self.variables = {v.name: v for v in model.modelVariables}
+        self.has_feedthrough = any(output.dependencies != [] for output in model.outputs)
         self.inputs: list[tuple[Part, str, list[int], list[int]]] = []
 
     def connect(self, others: list["Part"]) -> None:
@@ -57,8 +58,14 @@ class Part:
         for (_, kind, _, write), row in zip(self.inputs, values, strict=True):
             getattr(self.fmu, f"set{kind}")(write, row)
 
-    def outputs(self, references: list[int]) -> list[float]:
-        return self.fmu.getFloat64(references)
+    def row(self, port: str) -> list[float]:
+        """Return the current columns of an output port."""
+        own = [v for v in self.variables.values() if v.name.startswith(f"{port}.") and v.causality == "output"]
+        values: dict[int, Any] = {}
+        for kind in {v.type for v in own}:
+            references = [v.valueReference for v in own if v.type == kind]
+            values |= zip(references, getattr(self.fmu, f"get{kind}")(references), strict=True)
+        return [float(values[v.valueReference]) for v in own]
 
 
 def _is_output(part: Part, name: str) -> bool:
@@ -66,24 +73,28 @@ def _is_output(part: Part, name: str) -> bool:
 
 
 def coupled(setup: RunConfig, paths: dict[str, Path], jacobi: bool, ticks: int) -> np.ndarray:
-    """Return the position at each tick, shape (ticks, 3) [m]."""
+    """Return the columns of `truth` at each tick, shape (ticks, n); the first three are the position [m].
+
+    The FMUs step in the order of `paths`, the plant first. In a Gauss-Seidel coupling, those without direct
+    feedthrough take their inputs before the first step, as in the run.
+    """
     parts = [Part(name, path) for name, path in paths.items()]
     for part in parts:
         part.connect(parts)
-    plant = next(part for part in parts if part.name == "plant")
-    references = [plant.variables[f"truth.position_world[{i}]"].valueReference for i in range(3)]
-    for part in parts:  # in the order of execution, so that outputs of tick 0 exist before they are read
+    plant = parts[0]
+    for part in parts:
         part.fmu.enterInitializationMode()
-        if part is not plant:
-            part.set(part.values())
+    for part in parts[1:]:  # in the order of execution; the plant reads the tick before
+        part.set(part.values())
+    for part in parts:
         part.fmu.exitInitializationMode()
-    rows = [plant.outputs(references)]
+    rows = [plant.row("truth")]
     for k in range(ticks - 1):
-        options = [part.values() for part in parts] if jacobi else []
-        for i, part in enumerate(parts):
-            part.set(options[i] if jacobi else part.values())
+        early = {part.name: part.values() for part in parts if jacobi or not part.has_feedthrough}
+        for part in parts:
+            part.set(early[part.name] if part.name in early else part.values())
             part.fmu.doStep(k * setup.interval, setup.interval)
-        rows.append(plant.outputs(references))
+        rows.append(plant.row("truth"))
     for part in parts:
         part.fmu.freeInstance()
     return np.array(rows)
@@ -120,8 +131,7 @@ def main(scene: str, *rates: str) -> None:
             paths = {part: Path(name) / f"{part}.fmu" for part in setup.order}
             for part, path in paths.items():
                 export_fmu(setup, part, path)
-            sequential = coupled(setup, paths, False, len(own))
-            jacobi = coupled(setup, paths, True, len(own))
+            sequential, jacobi = (coupled(setup, paths, way, len(own))[:, :3] for way in (False, True))
         cells = (
             distance(sequential, own),
             distance(jacobi, parallel),

@@ -30,8 +30,10 @@ QUANTITIES = {
     "kg/m^3": "Density",
     "s": "Time",
 }
-_FMI3 = {kinds.REAL: "Float64", kinds.INTEGER: "Int32", kinds.BOOLEAN: "Boolean"}
-_FMI2 = {kinds.REAL: "Real", kinds.INTEGER: "Integer", kinds.BOOLEAN: "Boolean"}
+TYPES = {  # type in the description by version of FMI and type of the variable
+    2: {kinds.REAL: "Real", kinds.INTEGER: "Integer", kinds.BOOLEAN: "Boolean"},
+    3: {kinds.REAL: "Float64", kinds.INTEGER: "Int32", kinds.BOOLEAN: "Boolean"},
+}
 
 
 class ModelNames(NamedTuple):
@@ -156,11 +158,13 @@ def _text(v: Variable) -> str:
 
 
 def _variable3(listed: Xml.Element, reference: int, v: Variable) -> None:
-    Xml.SubElement(listed, _FMI3[v.type], _common(reference, v) | _type_attributes(v))
+    Xml.SubElement(listed, TYPES[3][v.type], _common(reference, v) | _type_attributes(v))
 
 
 def _variable2(listed: Xml.Element, reference: int, v: Variable) -> None:
-    Xml.SubElement(Xml.SubElement(listed, "ScalarVariable", _common(reference, v)), _FMI2[v.type], _type_attributes(v))
+    Xml.SubElement(
+        Xml.SubElement(listed, "ScalarVariable", _common(reference, v)), TYPES[2][v.type], _type_attributes(v)
+    )
 
 
 def _structure(root: Xml.Element, part: ExportedPart, variables: Sequence[Variable], version: int) -> None:

@@ -14,11 +14,13 @@ from lapwing.cosim.diagram.multi_vehicle import members
 from lapwing.fmi import variables as kinds
 from lapwing.fmi.fmu import ZIP_DATE, export_fmu
 from lapwing.fmi.machine_code import PORTABLE
+from lapwing.fmi.model_description import TYPES
 from lapwing.fmi.variables import column_names, variables_of
 from lapwing.services.common.foreign_code import FMU_SUFFIX
 from lapwing.services.fmu import system_structure as ssp
 from lapwing.services.fmu.description import content_of
 from lapwing.services.fmu.service_config import (
+    CLOCK,
     CO_SIMULATION,
     MODEL_EXCHANGE,
     SCHEDULED_EXECUTION,
@@ -32,6 +34,8 @@ SSP_VERSIONS = {3: "2.0", 2: "1.0"}  # SSP version by version of FMI; SSP 1.0 ha
 _INTERFACES = {
     CO_SIMULATION: "CoSimulation", MODEL_EXCHANGE: "ModelExchange", SCHEDULED_EXECUTION: "ScheduledExecution",
 }  # fmt: skip
+_BOTH_VERSIONS = {"Float64": "Real", "Int32": "Integer"}  # names of types that readers of SSP 1.0 know, too
+_UNTYPED = (CLOCK, "Enumeration")  # the package would need their definitions, which the FMU has
 
 
 class _Source(NamedTuple):
@@ -42,12 +46,19 @@ class _Source(NamedTuple):
     factor: float  # conversion from its unit to that of the other end
 
 
+class _Connector(NamedTuple):
+    """Input or output of a component."""
+
+    kind: str  # INPUT or OUTPUT
+    type: str  # type in the description of the FMU: Real, Float64, ...
+
+
 class _Component(NamedTuple):
     """An FMU of the package."""
 
     name: str
     implementation: str
-    connectors: dict[str, str]  # causality by name
+    connectors: dict[str, _Connector]  # by name
     sources: dict[str, _Source]  # by input
     start: Sequence[StartValue]
 
@@ -66,13 +77,17 @@ def export_system(setup: RunConfig, out: Path, version: int = 3, cpu: str = PORT
     """
     fmus = fmus_of(setup.services)
     _check(setup, fmus, version)
-    parts: dict[str, dict[str, str]] = {}  # causality by connector
+    parts: dict[str, dict[str, _Connector]] = {}
     files: dict[str, bytes] = {}
     with tempfile.TemporaryDirectory() as folder:
         for name in (each for each in setup.order if not each.endswith(FMU_SUFFIX)):
             path = Path(folder) / f"{name}.fmu"
             variables = variables_of(export_fmu(setup, name, path, version, cpu))
-            parts[name] = {v.name: v.causality for v in variables if v.causality in (kinds.INPUT, kinds.OUTPUT)}
+            parts[name] = {
+                v.name: _Connector(v.causality, TYPES[version][v.type])
+                for v in variables
+                if v.causality in (kinds.INPUT, kinds.OUTPUT)
+            }
             files[ssp.FMU_PATH.format(name)] = path.read_bytes()
     for fmu in fmus:
         content = content_of(f"services.{fmu.name}.fmu", Path(fmu.path), fmu.content)
@@ -101,16 +116,18 @@ def _check(setup: RunConfig, fmus: Iterable[FmuConfig], version: int) -> None:
                 raise ValueError(f"{message}, which SSP cannot connect; use scalar variables")
 
 
-def _components(setup: RunConfig, parts: dict[str, dict[str, str]], fmus: Sequence[FmuConfig]) -> list[_Component]:
+def _components(
+    setup: RunConfig, parts: dict[str, dict[str, _Connector]], fmus: Sequence[FmuConfig]
+) -> list[_Component]:
     """Return the parts in the order of execution, and the FMUs, with their connections."""
     ports = [port for service in setup.services.values() for port in service.ports]
     names = {(port.name, k): name for port in ports for k, name in enumerate(column_names(port))}
-    own = {n: _Source(part, n, 1.0) for part in parts for n, kind in parts[part].items() if kind == kinds.OUTPUT}
+    own = {n: _Source(part, n, 1.0) for part in parts for n, c in parts[part].items() if c.kind == kinds.OUTPUT}
     of_fmus = {(c.port, c.column): _Source(f.name, c.element.variable, c.factor) for f in fmus for c in f.outputs}
     computed = {**own, **{names[column]: source for column, source in of_fmus.items()}}
     result = []
     for name, connectors in parts.items():
-        inputs = [n for n, kind in connectors.items() if kind == kinds.INPUT and n in computed]
+        inputs = [n for n, c in connectors.items() if c.kind == kinds.INPUT and n in computed]
         result.append(_Component(name, "CoSimulation", connectors, {n: computed[n] for n in inputs}, ()))
     for fmu in fmus:
         sources = {}
@@ -119,8 +136,8 @@ def _components(setup: RunConfig, parts: dict[str, dict[str, str]], fmus: Sequen
             source = of_fmus[column] if c.port.startswith(own_port("")) else own[names[column]]
             sources[c.element.variable] = source._replace(factor=source.factor * c.factor)
         connectors = {
-            **{c.element.variable: kinds.INPUT for c in fmu.inputs},
-            **{c.element.variable: kinds.OUTPUT for c in fmu.outputs},
+            **{c.element.variable: _Connector(kinds.INPUT, c.element.type) for c in fmu.inputs},
+            **{c.element.variable: _Connector(kinds.OUTPUT, c.element.type) for c in fmu.outputs},
         }
         result.append(_Component(fmu.name, _INTERFACES[fmu.interface], connectors, sources, fmu.start))
     return result
@@ -150,8 +167,11 @@ def _structure(setup: RunConfig, components: Sequence[_Component], version: str)
         source = {"source": ssp.FMU_PATH.format(each.name)}
         component = Xml.SubElement(elements, f"{description}Component", {"name": each.name, **attributes, **source})
         own = Xml.SubElement(component, f"{description}Connectors") if each.connectors else component
-        for name, kind in each.connectors.items():
-            Xml.SubElement(own, f"{description}Connector", {"name": name, "kind": kind})
+        for name, connector in each.connectors.items():
+            entry = Xml.SubElement(own, f"{description}Connector", {"name": name, "kind": connector.kind})
+            if connector.type not in _UNTYPED:
+                kind = _BOTH_VERSIONS.get(connector.type, connector.type)
+                Xml.SubElement(entry, f"{common}{kind}")  # without unit: that of the FMU
         if each.start:
             component.append(_parameters(each.start, version))
         notes = Xml.SubElement(component, f"{description}Annotations")

@@ -1,6 +1,7 @@
 """Description of an FMU and its connectable variables."""
 
 import base64
+import difflib
 import math
 import re
 from collections.abc import Mapping
@@ -16,6 +17,7 @@ from lapwing.services.fmu.service_config import CLOCK, SCHEDULED_EXECUTION, Elem
 INTEGERS = ("Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64")
 TYPES = ("Real", "Float64", "Float32", "Integer", *INTEGERS, "Boolean", "Enumeration")
 TEXTS = ("String", "Binary")  # types of start values, Binary in hexadecimal
+LISTED = 10  # variables that a message names
 _BASE = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")  # base units in FMI
 
 
@@ -69,9 +71,12 @@ class Description:
             head, _, index = name[:-1].rpartition("[")
             v = self._variables.get(head)
         if v is None:
-            raise ConfigError.unknown(key, "variable", name, self._variables)
+            fitting = self._listed(name, causality)
+            raise ConfigError(key, f"unknown variable {name!r}", f"one of {fitting}" if fitting else "none")
         if causality and v.causality != causality:
-            raise ConfigError(key, f"{name} has causality {v.causality}", f"an {causality} of the FMU")
+            message = f"{name} has causality {v.causality}"
+            fitting = self._listed(name, causality)
+            raise ConfigError(key, message, f"an {causality} of the FMU{fitting and ': '}{fitting}")
         is_clock = v.type == CLOCK and self.interface == SCHEDULED_EXECUTION and causality
         if is_clock and causality == "input" and v.intervalVariability != TRIGGERED:
             raise ConfigError(key, f"{name} is a clock with its own ticks", "a triggered clock, or another variable")
@@ -89,6 +94,16 @@ class Description:
                 return [Element(name, v.valueReference, v.type, 0, 1)]
             return [Element(f"{name}[{i}]", v.valueReference, v.type, i, size) for i in range(size)]
         return [Element(name, v.valueReference, v.type, _position(key, name, index, shape), size)]
+
+    def _listed(self, name: str, causality: str) -> str:
+        """Return the names of the variables of a causality, or with a start value; the nearest to `name` first."""
+        own = [
+            n for n, v in self._variables.items() if (v.causality == causality if causality else v.start is not None)
+        ]
+        near = difflib.get_close_matches(name, own, LISTED, cutoff=0.5)
+        names = [*near, *(n for n in own if n not in near)]
+        more = f" and {len(names) - LISTED} more" if len(names) > LISTED else ""
+        return ", ".join(names[:LISTED]) + more
 
     def _shape(self, v: Any) -> tuple[int, ...]:
         """Return the lengths of an array at the start values of the structural parameters; () for a scalar."""

@@ -9,18 +9,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 from recorded_ports import RecordedPorts, scene_config
+from truth_digest import digest_of_rows
 
 pytest.importorskip("fmpy")
 from driven_fmu import Slave, assert_recorded_outputs
 from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
-from lapwing.cosim.diagram.topic_encoder import encode
 from lapwing.fmi.exported_part import export_part
 from lapwing.fmi.fmu import export_fmu
 from lapwing.fmi.variables import Variable, variables_of
-from lapwing.messages.digest import Digest
-from lapwing.messages.topics import TRUTH
 
 
 def run_command(*arguments: str) -> subprocess.CompletedProcess[str]:
@@ -186,18 +184,6 @@ def test_wrong_step_is_error_not_crash(plant: Path) -> None:
     a.close()
 
 
-def truth_digest(recorded: RecordedPorts, rows: np.ndarray) -> str:
-    """Return the digest of the topic truth from its rows, as the recorder computes it."""
-    service = next(s for s in recorded.diagram.services if s.name == "plant")
-    wire = next(w for w in service.wires if w.topic.name == TRUTH.name)
-    ticks = np.arange(len(rows))
-    digest = Digest()
-    for page in encode(wire, recorded.diagram.ports[wire.port], recorded.setup, ticks, rows):
-        payloads = np.ascontiguousarray(page.payloads).view(np.uint8).reshape(len(ticks), -1)
-        digest.update_page(page.topic.name, page.ticks * recorded.setup.interval_ns, payloads)
-    return digest.hexdigest()
-
-
 def truth_rows(result: np.ndarray, variables: list[Variable]) -> np.ndarray:
     names = [v.name for v in variables if v.name.startswith("truth.")]
     return np.ascontiguousarray(np.column_stack([result[name].astype(float) for name in names]))
@@ -216,7 +202,8 @@ def test_vehicle_has_truth_digest_of_run(scene: str, version: int, tmp_path: Pat
     result = simulate_fmu(str(path), output=names, stop_time=stop, output_interval=recorded.setup.interval)
     assert len(result) == recorded.ticks
     expected = np.array([recorded.sample("truth", k) for k in range(recorded.ticks)])
-    assert truth_digest(recorded, truth_rows(result, variables)) == truth_digest(recorded, expected)
+    rows = truth_rows(result, variables)
+    assert digest_of_rows(recorded.setup, rows) == digest_of_rows(recorded.setup, expected)
 
 
 @pytest.mark.long

@@ -108,3 +108,34 @@ def test_million_random_inputs_do_not_crash(plant: Path) -> None:
     a.step(TICK)
     assert a.get(HEIGHT) == pytest.approx(50.0, abs=1e-3)
     a.close()
+
+
+def test_initialisation_mode_has_outputs_of_first_tick(plant: Path) -> None:
+    """Importers read them there to set the inputs of other FMUs."""
+    a, b = Slave(plant, "a"), Slave(plant, "b")
+    a.prepare()
+    assert a.get(HEIGHT) == pytest.approx(AT_REST, abs=0.01)
+    a.set(START, AT_REST + 2.0)
+    expected = a.get(HEIGHT)
+    assert expected == pytest.approx(AT_REST + 2.0, abs=0.01)
+    a.fmu.exitInitializationMode()
+    b.begin(**{START: AT_REST + 2.0})
+    assert a.get(HEIGHT) == b.get(HEIGHT) == expected
+    a.step(10 * TICK)
+    b.step(10 * TICK)
+    assert a.get(HEIGHT) == b.get(HEIGHT)
+    a.close()
+    b.close()
+
+
+def test_event_that_recorded_run_did_not_have_is_logged_once(tmp_path: Path) -> None:
+    path = tmp_path / "pilot.fmu"
+    export_fmu(scene_config("hover", **{"effects.battery": "{}"}), "autopilot", path)
+    a = Slave(path, loggingOn=True)
+    a.begin()
+    a.set("battery.charge", 0.01)
+    for _ in range(100):
+        a.step(TICK)
+    (message,) = a.messages
+    assert "the recorded run of the scene did not have" in message[1]
+    a.close()

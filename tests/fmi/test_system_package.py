@@ -145,6 +145,17 @@ def test_structure_satisfies_schema_of_fmpy(folder: Path) -> None:
     assert {("plant", "autopilot"), ("trajectory", "autopilot"), ("autopilot", "plant")} <= ends
 
 
+@pytest.mark.parametrize("fmi", [2, 3])
+def test_connectors_have_types(folder: Path, fmi: int) -> None:
+    """The master libcosim requires them; their names are those of SSP 1.0, which SSP 2.0 has, too."""
+    with zipfile.ZipFile(folder / f"hover{fmi}.ssp") as archive:
+        root = Xml.fromstring(archive.read(STRUCTURE))
+    connectors = {each.get("name"): each for each in root.iter() if each.tag.endswith("}Connector")}
+    found = [connectors[name][0].tag for name in ("truth.position_world[0]", "status.phase", "actuators.armed")]
+    assert [tag.rpartition("}")[2] for tag in found] == ["Real", "Integer", "Boolean"]
+    assert all(len(each) == 1 for each in connectors.values())
+
+
 @pytest.mark.long
 def test_fmpy_flies_package(folder: Path) -> None:
     from fmpy.ssp.simulation import simulate_ssp

@@ -26,8 +26,9 @@ typedef struct {
     void *logger;
     int logging, mode, event_mode, early_return;
     double start, time; /* [s] of the experiment; last communication point */
-    int64_t warned;     /* wake-ups of Python blocks already reported */
+    int64_t warned;     /* 1 after the warning of events that the recorded run did not have */
     void *memory;
+    void *first;        /* in initialisation mode: the memory after tick 0 with the inputs so far; NULL until read */
 } instance;
 
 static log_function report; /* defined by each version */
@@ -42,52 +43,54 @@ static int fail(instance *self, const char *format, ...) {
     return ERROR;
 }
 
+static void *new_memory(void) { return aligned_alloc(64, (part_size() + 63) / 64 * 64); }
+
+static void forget_first(instance *self) { free(self->first), self->first = NULL; }
+
+static void free_instance(instance *self) {
+    if (!self) return;
+    forget_first(self);
+    free(self->memory);
+    free(self->name);
+    free(self);
+}
+
 static instance *new_instance(const char *name, const char *token) {
     instance *self = calloc(1, sizeof *self);
     if (!self) return NULL;
     self->name = strdup(name ? name : "");
-    self->memory = aligned_alloc(64, (part_size() + 63) / 64 * 64);
+    self->memory = new_memory();
     if (!self->name || !self->memory || !token || strcmp(token, INSTANTIATION_TOKEN)) {
-        free(self->memory);
-        free(self->name);
-        free(self);
+        free_instance(self);
         return NULL;
     }
     part_reset(self->memory);
     return self;
 }
 
-static void free_instance(instance *self) {
-    if (!self) return;
-    free(self->memory);
-    free(self->name);
-    free(self);
-}
-
 static int reset_instance(instance *self) {
+    forget_first(self);
     part_reset(self->memory);
-    self->mode = INSTANTIATED;
-    self->warned = 0;
+    self->mode = INSTANTIATED, self->warned = 0;
     return OK;
 }
 
 static int advance_one(instance *self) {
-    int result = part_advance(self->memory);
-    if (result == PART_FAILED) {
+    if (part_advance(self->memory) == PART_FAILED) {
         self->mode = FAILED;
         return fail(self, "t = %g s: the state is not finite; check the inputs, or reset", self->time);
     }
-    int64_t missed = STATE(self->memory)->missed;
-    if (missed != self->warned) {
+    if (STATE(self->memory)->missed && !self->warned) {
         report(self, WARNING, "logStatusWarning",
                "an event occurred that the recorded run of the scene did not have; the flight manager repeats its "
                "recorded commands and does not react");
-        self->warned = missed;
+        self->warned = 1;
     }
     return OK;
 }
 
 static int initialise(instance *self) {
+    forget_first(self);
     self->time = self->start;
     self->mode = STEP;
     return advance_one(self);
@@ -144,8 +147,21 @@ static int step_to(instance *self, double from, double step, int *event) {
     return OK;
 }
 
+/* Return the memory with the outputs. Initialisation mode needs those of tick 0 before it is left. */
+static const void *outputs(instance *self) {
+    if (self->mode != INITIALIZATION) return self->memory;
+    if (!self->first && (self->first = new_memory())) {
+        memcpy(self->first, self->memory, part_size());
+        part_relocate(self->first);
+        part_advance(self->first);
+    }
+    return self->first ? self->first : self->memory;
+}
+
 static int get_number(instance *self, uint32_t reference, int type, double *value) {
-    if (reference < VARIABLES && part_variables[reference].type == type && !part_number(self->memory, reference, value)) {
+    if (reference < VARIABLES && part_variables[reference].type == type) {
+        const void *memory = part_variables[reference].place == OUTPUT ? outputs(self) : self->memory;
+        part_number(memory, reference, value);
         if (part_variables[reference].place == TIME) *value = self->time;
         return OK;
     }
@@ -158,6 +174,7 @@ static int set_number(instance *self, uint32_t reference, int type, double value
     if (part_set_number(self->memory, reference, value))
         return fail(self, "%s: cannot be set now; set an input, a parameter, or a start value before initialisation",
                     part_variables[reference].name);
+    forget_first(self);
     return OK;
 }
 
@@ -189,6 +206,7 @@ static int is_saved(const void *state, size_t size) {
 
 static void load(instance *self, const void *state) {
     saved_header header;
+    forget_first(self);
     memcpy(&header, state, sizeof header);
     self->mode = (int)header.mode, self->start = header.start, self->time = header.time, self->warned = header.warned;
     memcpy(self->memory, (const char *)state + sizeof header, part_size());

@@ -185,9 +185,14 @@ def test_fmu_without_allow_code_is_rejected(folder: Path) -> None:
     [
         ({"fmu": "missing.fmu"}, "no such file"),
         ({"fmu": "imported.toml"}, "not an FMU"),
-        ({"inputs": f'v = "{COLUMN}"'}, "services.motor.inputs.v: unknown variable 'v'"),
-        ({"inputs": f'y = "{COLUMN}"'}, "y has causality output; expected an input of the FMU"),
-        ({"outputs": f'"{COLUMN}" = "u"'}, "u has causality input; expected an output of the FMU"),
+        ({"inputs": f'v = "{COLUMN}"'}, "services.motor.inputs.v: unknown variable 'v'; expected one of u\n"),
+        (
+            {"outputs": f'"{COLUMN}" = "v"'},
+            f"services.motor.outputs.\"{COLUMN}\": unknown variable 'v'; expected one of y\n",
+        ),
+        ({"start": "gian = 1.0"}, "services.motor.start.gian: unknown variable 'gian'; expected one of gain, "),
+        ({"inputs": f'y = "{COLUMN}"'}, "y has causality output; expected an input of the FMU: u\n"),
+        ({"outputs": f'"{COLUMN}" = "u"'}, "u has causality input; expected an output of the FMU: y\n"),
         ({"inputs": 'u = "wing.lift"'}, "unknown port 'wing'"),
         ({"inputs": 'u = "truth.position_world.7"'}, "unknown column"),
         (
@@ -421,3 +426,16 @@ def test_exported_autopilot_flies_like_built_in_one(version: int, mode: str, tmp
         done = run_command("run", str(each), "--allow-code", "--mode", mode, "--log", str(log))
         assert done.returncode == 0, done.stderr
     assert payloads(logs[0], "/ground_truth") == payloads(logs[1], "/ground_truth")
+
+
+def test_long_list_of_variables_begins_with_nearest_ones(tmp_path: Path) -> None:
+    path = tmp_path / "plant.fmu"
+    export_fmu(scene_resolver.resolve(scene_resolver.load("hover")), "plant", path)
+    scene = scene_with(tmp_path, "plant.fmu", f'"actuators.motor_volt[2]" = "{COLUMN}"')
+    with pytest.raises(ValueError, match=r"unknown variable 'actuators.motor_volt\[2\]'") as error:
+        scene_resolver.resolve(scene_resolver.load(scene))
+    _, _, listed = str(error.value).partition("expected one of ")
+    assert listed.startswith("actuators.motor_voltage[2], actuators.motor_voltage[")
+    assert "truth" not in listed
+    assert listed.endswith(" more")
+    assert listed.count(",") == 9
