@@ -264,10 +264,10 @@ def test_groundstations_services_fly_as_separate_processes(tmp_path):
 
         assert station.recv_match(type="HEARTBEAT", blocking=True, timeout=PATIENCE)
         ready = mavutil.mavlink.MAV_SYS_STATUS_PREARM_CHECK
-        while (
-            not station.recv_match(type="SYS_STATUS", blocking=True, timeout=PATIENCE).onboard_control_sensors_health & ready
-        ):
-            pass
+        health = 0
+        while not health & ready:
+            status = station.recv_match(type="SYS_STATUS", blocking=True, timeout=PATIENCE)
+            health = status.onboard_control_sensors_health
         assert order(400, 1.0, 0.0) == 0
         assert order(22) == 0
         while station.recv_match(type="GLOBAL_POSITION_INT", blocking=True, timeout=PATIENCE).relative_alt < 1500:

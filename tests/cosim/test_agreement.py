@@ -25,7 +25,7 @@ FAULTS = [
     'sensors.sonar.faults=[{kind="spikes", start=0.1, size=2.0}]',
     'sensors.magnetometer.faults=[{kind="delay", start=0.4, samples=3}]',
 ]
-BATTERY = ["effects.battery.initial_charge=0.16", "effects.dc_motor={}"]
+BATTERY = ["effects.battery.initial_charge=0.16"]
 EVENT = 'multibody.event=[{time=0.3, propeller=2, failure="locked"}, {time=0.31, propeller=4, failure="torn_off"}]'
 SCRIPT = {0.04: [command("takeoff", 3.0), command("arm")], 0.6: [command("parameter", 5.0, text="PID_Z_P")]}
 
