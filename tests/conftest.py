@@ -5,7 +5,18 @@ import resource
 import hypothesis
 import pytest
 
-SLOWEST = ("test_readme.py", "test_options.py", "test_stress.py", "test_scenes.py", "test_library.py")  # minutes each
+SLOWEST = (  # minutes each
+    "test_readme.py",
+    "test_real_firmware.py",  # waits for the clock while others compile
+    "test_rust_controller.py",
+    "test_exact_arithmetic.py",
+    "test_scenes.py",
+    "test_propeller_failures.py",
+    "test_stress.py",
+    "test_library.py",
+    "test_options.py",
+    "test_compose.py",
+)
 _PEAK = "peak_memory_mb"
 _peaks = pytest.StashKey[dict[str, float]]()
 
@@ -19,8 +30,9 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Move the slowest files, then the other long tests, to the front; keep the order otherwise."""
-    items.sort(key=lambda item: (item.path.name not in SLOWEST, item.get_closest_marker("long") is None))
+    """Move the slowest files, in their order, then the other long tests, to the front; keep the order otherwise."""
+    ranks = {name: rank for rank, name in enumerate(SLOWEST)}
+    items.sort(key=lambda item: (ranks.get(item.path.name, len(SLOWEST)), item.get_closest_marker("long") is None))
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:

@@ -29,6 +29,7 @@ pytestmark = pytest.mark.long
 yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
 
 ROOT = Path(__file__).parent.parent
+PATIENCE = 600.0  # [s] for processes that start, compile and end on a busy machine
 SET = {"SCENE": "lapwing/scenes/groundstation.toml", "SPEED": "2"}
 
 
@@ -40,8 +41,8 @@ def compose(**inputs):
 
 
 @contextmanager
-def ended_after(seconds):
-    """A list of processes, which are ended at last, each within so many seconds."""
+def ended():
+    """A list of processes, which are ended at last."""
     running = []
     try:
         yield running
@@ -49,7 +50,7 @@ def ended_after(seconds):
         for process in running:
             process.terminate()
         for process in running:
-            process.wait(timeout=seconds)
+            process.wait(PATIENCE)
 
 
 def free_port(kind=socket.SOCK_STREAM):
@@ -192,11 +193,11 @@ def test_cluster_flies_campaign(tmp_path):
         with (tmp_path / f"{name}.txt").open("w") as output:
             return subprocess.Popen([*program, *more], cwd=ROOT, stdout=output, stderr=subprocess.STDOUT)
 
-    with ended_after(60) as helpers:
+    with ended() as helpers:
         helpers.append(begun("scheduler"))
         helpers.append(begun("worker"))
         flights = begun("campaign", "--set", "run.duration=1", "--runs", "4")
-        assert flights.wait(timeout=300) == 0, (tmp_path / "campaign.txt").read_text()
+        assert flights.wait(PATIENCE) == 0, (tmp_path / "campaign.txt").read_text()
         assert "4 runs" in (tmp_path / "campaign.txt").read_text()
         assert (tmp_path / "campaign" / "report.html").exists()
         assert "Register worker" in (tmp_path / "scheduler.txt").read_text()
@@ -215,7 +216,7 @@ def flying(services, name, folder, *more):
         return word.replace("recordings/", f"{folder}/")
 
     running = {}
-    with ended_after(30) as processes:
+    with ended() as processes:
         for each in [*({*services[name]["depends_on"]} - {"keys"}), name]:
             command = [sys.executable, "-m", "lapwing", *map(here, services[each]["command"][1:]), *more]
             with (folder / f"{each}.txt").open("w") as output:
@@ -236,7 +237,7 @@ def test_viewer_with_certificate_receives_flight_and_events(tmp_path):
         while (message := client.next()) is not None:
             if isinstance(message, bytes) and message[0] == 1:
                 seen[struct.unpack_from("<I", message, 1)[0]] += 1
-        ends = {name: process.wait(timeout=60) for name, process in running.items()}
+        ends = {name: process.wait(PATIENCE) for name, process in running.items()}
     assert ends == dict.fromkeys(ends, 0), {name: (tmp_path / f"{name}.txt").read_text() for name in ends}
     assert seen[0] > 100
     assert seen[1] > 0
@@ -244,13 +245,12 @@ def test_viewer_with_certificate_receives_flight_and_events(tmp_path):
 
 def test_groundstations_services_fly_as_separate_processes(tmp_path):
     services = compose(SCHEME="tcp", LINKS="--insecure")
-    with flying(services, "groundstation", tmp_path) as (_, ports):
+    with flying(services, "groundstation", tmp_path) as (running, ports):
         port = ports["0.0.0.0:5760"]
         station = None
-        for _ in range(120):
+        while station is None and running["groundstation"].poll() is None:
             try:
                 station = mavutil.mavlink_connection(f"tcp:127.0.0.1:{port}", retries=1)
-                break
             except OSError:
                 time.sleep(0.5)
         assert station, (tmp_path / "groundstation.txt").read_text()
@@ -258,19 +258,19 @@ def test_groundstations_services_fly_as_separate_processes(tmp_path):
         def order(number, *params):
             station.mav.heartbeat_send(6, 8, 0, 0, 0)
             station.mav.command_long_send(1, 1, number, 0, *params, *[math.nan] * (7 - len(params)))
-            while (ack := station.recv_match(type="COMMAND_ACK", blocking=True, timeout=60)).command != number:
+            while (ack := station.recv_match(type="COMMAND_ACK", blocking=True, timeout=PATIENCE)).command != number:
                 pass
             return ack.result
 
-        assert station.recv_match(type="HEARTBEAT", blocking=True, timeout=120)
+        assert station.recv_match(type="HEARTBEAT", blocking=True, timeout=PATIENCE)
         ready = mavutil.mavlink.MAV_SYS_STATUS_PREARM_CHECK
-        while (
-            not station.recv_match(type="SYS_STATUS", blocking=True, timeout=60).onboard_control_sensors_health & ready
-        ):
-            pass
+        health = 0
+        while not health & ready:
+            status = station.recv_match(type="SYS_STATUS", blocking=True, timeout=PATIENCE)
+            health = status.onboard_control_sensors_health
         assert order(400, 1.0, 0.0) == 0
         assert order(22) == 0
-        while station.recv_match(type="GLOBAL_POSITION_INT", blocking=True, timeout=60).relative_alt < 1500:
+        while station.recv_match(type="GLOBAL_POSITION_INT", blocking=True, timeout=PATIENCE).relative_alt < 1500:
             pass
         station.close()
         assert "not part of" in (tmp_path / "trajectory.txt").read_text()

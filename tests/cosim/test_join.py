@@ -22,6 +22,7 @@ from tests.endpoints import loopback_endpoints
 pytestmark = pytest.mark.long
 
 SCENE = "lapwing/scenes/gyrostat_blocked.toml"
+PATIENCE = 300.0  # [s] for processes that start on a busy machine
 
 
 def participant(name, peers, tmp_path, *more, insecure=True):
@@ -50,7 +51,7 @@ def test_participant_with_other_configuration_is_rejected(tmp_path):
     log = str(tmp_path / "log.mcap")
     recorder = participant("recorder", peers, tmp_path, *short, "--log", log)
     for process in (plant, recorder):
-        _, output = process.communicate(timeout=120)
+        _, output = process.communicate(timeout=PATIENCE)
         assert process.returncode == 2, output
         assert "services.plant.parameters.core.system.inertia.1" in output
         assert "501.0" in output
@@ -66,7 +67,7 @@ def test_same_set_up_flies_over_certified_links_to_same_digest(tmp_path):
     plant = participant("plant", peers, tmp_path, *more)
     recorder = participant("recorder", peers, tmp_path, *more, "--log", str(log))
     for process in (plant, recorder):
-        _, output = process.communicate(timeout=120)
+        _, output = process.communicate(timeout=PATIENCE)
         assert process.returncode == 0, output
     fly_single(resolve(load(SCENE, ["run.duration=50.0"])), alone)
     with LogReader(log) as read, LogReader(alone) as expected:
@@ -76,7 +77,7 @@ def test_same_set_up_flies_over_certified_links_to_same_digest(tmp_path):
 def test_start_without_certificate_needs_insecure(tmp_path):
     peers = loopback_endpoints(["plant", "recorder"])
     plant = participant("plant", peers, tmp_path, insecure=False)
-    _, output = plant.communicate(timeout=60)
+    _, output = plant.communicate(timeout=PATIENCE)
     assert plant.returncode == 2
     assert "endpoint is not authenticated; use tls/HOST:PORT with --keys FOLDER, or --insecure" in output
 
@@ -97,21 +98,20 @@ def test_participant_cannot_publish_for_others(tmp_path):
         for name, bus, _ in pairs:
             bus.declare_liveliness(f"test-access/{ALIVE_KEY}/{name}")
         for _, bus, other in pairs:
-            assert not bus.wait_for_liveliness([f"test-access/{ALIVE_KEY}/{other}"], 10.0)
+            assert not bus.wait_for_liveliness([f"test-access/{ALIVE_KEY}/{other}"], PATIENCE)
         for name, bus, _ in pairs:
             own, bus._gid = bus._gid, run.gid("autopilot")
             bus.publisher(f"test-access/{STEP_KEY}/autopilot")(b"forged", 0)
             bus._gid = own
             bus.publisher(f"test-access/{STEP_KEY}/{name}")(b"own", 0)
         for name, bus, other in pairs:
-            messages = []
-            while (message := received[name].get_with_key(timeout=1.0)) is not None:
-                messages.append(message)
+            messages = [received[name].get_with_key(timeout=PATIENCE) for _ in range(2)]
             # what a session publishes itself comes back to it unfiltered
             assert sorted(messages) == [
                 (f"test-access/{STEP_KEY}/autopilot", 0, b"forged"),
                 (f"test-access/{STEP_KEY}/{other}", 0, b"own"),
             ]
+            assert received[name].get_with_key(timeout=1.0) is None
             assert bus.rejected == 0
 
 

@@ -26,6 +26,7 @@ from tests.endpoints import loopback_endpoints
 pytestmark = pytest.mark.long
 
 TICK = 4_000_000
+PATIENCE = 300.0  # [s] for a player that starts on a busy machine
 
 
 @pytest.fixture
@@ -69,7 +70,7 @@ def test_recorded_replay_has_equal_digest(log, tmp_path):
     again = tmp_path / "again.mcap"
     key_prefix, (endpoint,) = "test-record", loopback_endpoints(["a"]).values()
     command = replay(log, "--speed", "max", "--record", again, "--key-prefix", key_prefix, "--listen", endpoint)
-    subprocess.run(command, check=True, timeout=60)
+    subprocess.run(command, check=True, timeout=PATIENCE)
     with LogReader(log) as first, LogReader(again) as second:
         assert first.metadata["digest"] == second.metadata["digest"] == second.digest()
         assert second.metadata["seed"] == "1"
@@ -84,9 +85,9 @@ def test_subscriber_gets_every_message_in_order(log):
             arriving = bus.subscribe(f"{key_prefix}/clock")
             digest = Digest()
             for _ in range(200):
-                time_ns, payload = arriving.get(timeout=30.0)
+                time_ns, payload = arriving.get(timeout=PATIENCE)
                 digest.update("/clock", time_ns, payload)
-        assert player.wait(timeout=30) == 0
+        assert player.wait(PATIENCE) == 0
     with LogReader(log) as source:
         assert digest.hexdigest() == source.digest()
 
@@ -97,13 +98,13 @@ def test_replay_waits_for_confirmation_of_its_end(log):
     with subprocess.Popen(command) as player, ZenohBus(connect=[endpoint]) as bus:
         arriving = bus.subscribe(f"{key_prefix}/clock")
         bus.declare_liveliness(f"{key_prefix}/_alive/slow")
-        payloads = [arriving.get(timeout=30.0)[1]]
+        payloads = [arriving.get(timeout=PATIENCE)[1]]
         while payloads[-1]:
-            payloads.append(arriving.get(timeout=30.0)[1])
+            payloads.append(arriving.get(timeout=PATIENCE)[1])
         time.sleep(1.0)
         assert player.poll() is None
         bus.declare_liveliness(f"{key_prefix}/_heard/slow")
-        assert player.wait(timeout=30) == 0
+        assert player.wait(PATIENCE) == 0
     assert len(payloads) == 201
 
 
@@ -111,10 +112,10 @@ def test_signal_ends_loop_at_once(log):
     key_prefix, (endpoint,) = "test-signal", loopback_endpoints(["a"]).values()
     with subprocess.Popen(replay(log, "--loop", "--key-prefix", key_prefix, "--listen", endpoint)) as player:
         with ZenohBus(connect=[endpoint]) as bus:
-            assert bus.subscribe(f"{key_prefix}/clock").get(timeout=30.0) is not None
+            assert bus.subscribe(f"{key_prefix}/clock").get(timeout=PATIENCE) is not None
         requested = time.monotonic()
         player.terminate()
-        assert player.wait(timeout=30) == 143
+        assert player.wait(PATIENCE) == 143
         assert time.monotonic() - requested < 10.0
 
 
@@ -140,7 +141,7 @@ def test_unreplayable_log_is_rejected_in_single_line(log, arguments, output):
         replay(*arguments, *values, "--key-prefix", "test-error"),
         capture_output=True,
         text=True,
-        timeout=60,
+        timeout=PATIENCE,
         check=False,
     )
     assert result.returncode == 2

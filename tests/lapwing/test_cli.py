@@ -223,7 +223,7 @@ def test_check_prints_configuration(lapwing):
 
 def test_command_shows_no_traceback():
     command = [sys.executable, "-m", "lapwing", "run", "scenes/none.toml"]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    result = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
     assert result.returncode == 2
     assert result.stderr.startswith("lapwing: scenes/none.toml: no such file")
     assert result.stderr.count("\n") == 1

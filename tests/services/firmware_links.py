@@ -54,7 +54,7 @@ class Background:
         self._thread = threading.Thread(target=run, daemon=True)
         self._thread.start()
 
-    def join(self, timeout=60.0):
+    def join(self, timeout=300.0):
         """Wait for the end of the function. Return its result."""
         self._thread.join(timeout)
         assert not self._thread.is_alive()

@@ -1,5 +1,6 @@
 """`lapwing studio` as a user sees it: pick, change, run, look, compare, in headless Chromium."""
 
+import time
 import urllib.error
 import urllib.request
 
@@ -13,6 +14,7 @@ pytest.importorskip("viser", reason="needs viser (pip install lapwing[view3d])")
 
 pytestmark = [pytest.mark.long, pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")]
 
+PATIENCE = 300.0  # [s] for a page on a busy machine
 HELPERS = """
 const until = async (holds) => {
   for (let k = 0; k < 5000; k++) {
@@ -49,7 +51,8 @@ class User:
     def go(self, script, part):
         """Leave the page by a script; wait for a page whose address contains `part`."""
         self._browser.run(HELPERS + f"setTimeout(() => {{ {script} }}, 0);")
-        for _ in range(1200):
+        deadline = time.monotonic() + PATIENCE  # attempts fail at once while the page changes
+        while time.monotonic() < deadline:
             try:
                 if part in self._browser.run(
                     "await new Promise((done) => setTimeout(done, 50)); "

@@ -23,7 +23,7 @@ DAMAGE = [
     "effects.rotor_damage.rotor=2", "effects.rotor_damage.time=4.0", "effects.rotor_damage.remaining_thrust=0.55",
     "effects.rotor_damage.remaining_torque=0.55",
 ]  # fmt: skip
-BATTERY = ["effects.battery.initial_charge=0.1502", "vehicle.airframe=delivery_drone", "effects.dc_motor={}"]
+BATTERY = ["effects.battery.initial_charge=0.1502"]
 SHORT = [
     'trajectory.phase=[{name="wait", duration=1.0}, {name="climb", z={kind="ramp", to=1.0, rate=1.0}},'
     ' {name="descend", z={kind="ramp", to=0.0, rate=1.0}}, {name="land", duration=2.0}]'
@@ -56,9 +56,9 @@ CASES = {
     "a motor is injured": (MISSION, 6.0, {4.0: [inject("motor", OFF, 2)]}, [OPERATOR, ENABLED]),
     "an emptying battery": (MISSION, 10.0, {}, [OPERATOR, *BATTERY]),
     "a lost position": (MISSION, 9.0, {}, [OPERATOR, *SOON, GPS_LOST]),
-    "a damaged rotor": (MISSION, 8.0, {}, [OPERATOR, *DAMAGE]),
+    "a damaged rotor": (SCENE, 8.0, {}, [OPERATOR, *DAMAGE]),
     "on the truth": (SCENE, 4.0, LINK, [OPERATOR, *SOON]),
-    "nobody listens, a damaged rotor": (MISSION, 8.0, {}, DAMAGE),
+    "nobody listens, a damaged rotor": (SCENE, 8.0, {}, DAMAGE),
     "nobody listens, a lost position": (MISSION, 9.0, {}, [*SOON, GPS_LOST]),
     "nobody listens, an emptying battery": (MISSION, 10.0, {}, BATTERY),
     "no trajectory": (GROUND, 6.0, {0.04: [command("takeoff", 2.0), command("arm", NAN, 10.0)]}, []),

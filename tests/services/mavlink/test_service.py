@@ -141,7 +141,7 @@ def test_replayed_log_has_telemetry_but_rejects_commands(tmp_path):
         while next_message(station, "GLOBAL_POSITION_INT").relative_alt < 500:
             pass
         process.terminate()
-        process.communicate(timeout=30)
+        process.communicate(timeout=300)
     station.close()
 
 
@@ -182,7 +182,7 @@ def test_mission_of_plan_can_be_downloaded(tmp_path):
             station.mav.mission_request_int_send(1, 1, number, 0)
             result.append(next_message(station, "MISSION_ITEM_INT"))
         process.send_signal(signal.SIGTERM)
-        process.communicate(timeout=60)
+        process.communicate(timeout=300)
     station.close()
     assert [m.command for m in result] == [178, 22, 16, 16, 16, 16, 21]  # as in the file
     assert result[5].param1 == 5.0

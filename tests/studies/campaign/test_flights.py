@@ -18,6 +18,7 @@ from lapwing.studies.simulate import fly
 
 pytestmark = pytest.mark.long
 
+MISSION = ["effects.air_density={}", "effects.random_wind_force={}"]  # whose bodies are compiled for other tests
 BLOCKED_PROPELLER = 'multibody.event=[{time=1.0, propeller=2, failure="locked"}]'
 
 
@@ -28,7 +29,7 @@ BLOCKED_PROPELLER = 'multibody.event=[{time=1.0, propeller=2, failure="locked"}]
         ("delivery_mission", ["run.duration=20.0"]),
         ("delivery_mission", ["run.duration=10.0", "communication.coupling=jacobi"]),
         ("hover", ["effects.battery.initial_charge=0.071"]),
-        ("hover", ["run.duration=2.0", "vehicle.model=multibody", BLOCKED_PROPELLER]),
+        ("hover", ["run.duration=2.0", "vehicle.model=multibody", *MISSION, BLOCKED_PROPELLER]),
     ],
     ids=["hover", "mission", "parallel", "battery", "five bodies and an event"],
 )
