@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lapwing.cosim.output_lock import write_errors
 from lapwing.studies.complete_file import complete_file
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.view3d import require
@@ -102,11 +103,8 @@ def render(
         with Browser(address, size=shot.size) as browser:
             browser.run(f"{START} lapwingView.look({shot.camera!r}, 0, {_list(shot.place)});")
             pictures = _pictures(browser, times, target.suffix == ".png", progress)
-            try:
-                with complete_file(target) as file:
-                    write_film(file, target.suffix, pictures, shot)
-            except OSError as fault:
-                raise ValueError(f"{target}: cannot be written: {fault.strerror or fault}") from None
+            with write_errors(target), complete_file(target) as file:
+                write_film(file, target.suffix, pictures, shot)
     return target
 
 
