@@ -101,8 +101,10 @@ def identify(
         _fit_sensors(flights, mapping, out)
         return
     keys = [key.strip() for key in free.split(",") if key.strip()]
-    if not keys or len(set(keys)) < len(keys):
-        raise ValueError(f"--free {free}: expected different keys with commas between them, or --sensors")
+    if not keys:
+        raise ValueError("--free: missing; name the keys to estimate (airframe.mass.total,...), or use --sensors")
+    if len(set(keys)) < len(keys):
+        raise ValueError(f"--free {free}: names a key twice; expected different keys")
     steps = _horizons(horizons)
     check_distinct({"--out": out, "--json": json})
     claim(out)
