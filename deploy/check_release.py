@@ -9,6 +9,12 @@ from pathlib import Path
 PYTHONS = ("python3.11", "python3.12", "python3.13", "python3.14")
 
 
+def available() -> list[str]:
+    """Return the installed Pythons; a shim of a version manager may have none behind it."""
+    paths = [path for name in PYTHONS if (path := shutil.which(name))]
+    return [path for path in paths if not subprocess.run([path, "-c", ""], stderr=subprocess.DEVNULL).returncode]
+
+
 def check(python: str, wheel: Path) -> None:
     """Install the wheel and fly hover with it from an empty folder.
 
@@ -37,6 +43,5 @@ def check(python: str, wheel: Path) -> None:
 
 
 if __name__ == "__main__":
-    result = [path for name in PYTHONS if (path := shutil.which(name))]
-    for python in result or [sys.executable]:
+    for python in available() or [sys.executable]:
         check(python, Path(sys.argv[1]).resolve())

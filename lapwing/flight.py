@@ -14,6 +14,7 @@ from lapwing.cosim.log.log_sequencer import Recording
 from lapwing.cosim.output_lock import write_errors
 from lapwing.messages.topics import EVENTS
 from lapwing.runs.log_events import event_messages
+from lapwing.studies.complete_file import write_text
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_topics import topic_of
 from lapwing.studies.flight_tracking import AXES
@@ -49,8 +50,7 @@ class View:
 
     def save(self, path: str | Path) -> Path:
         """Write the page and return its path. Raise ValueError if it cannot be written."""
-        with write_errors(path):
-            Path(path).write_text(self.page, encoding="utf-8")
+        write_text(Path(path), self.page)
         return Path(path)
 
     def _repr_html_(self) -> str:

@@ -9,6 +9,7 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import check_distinct, check_log, claim, claim_named
+from lapwing.studies.complete_file import write_text
 
 Flights = Annotated[
     list[Path], typer.Argument(metavar="FLIGHTS...", help="Lapwing logs (.mcap), or logs that `lapwing import` reads")
@@ -100,8 +101,10 @@ def identify(
         _fit_sensors(flights, mapping, out)
         return
     keys = [key.strip() for key in free.split(",") if key.strip()]
-    if not keys or len(set(keys)) < len(keys):
-        raise ValueError(f"--free {free}: expected different keys with commas between them, or --sensors")
+    if not keys:
+        raise ValueError("--free: missing; name the keys to estimate (airframe.mass.total,...), or use --sensors")
+    if len(set(keys)) < len(keys):
+        raise ValueError(f"--free {free}: names a key twice; expected different keys")
     steps = _horizons(horizons)
     check_distinct({"--out": out, "--json": json})
     claim(out)
@@ -127,7 +130,7 @@ def _fit_sensors(flights: list[Path], mapping: str | None, out: Path) -> None:
     claim(out)
     names = ", ".join(path.name for path in flights)
     text = dump({"sensors": tables})
-    out.write_text(f"# Sensors as estimated from {names}; put these tables into a scene.\n\n{text}", encoding="utf-8")
+    write_text(out, f"# Sensors as estimated from {names}; put these tables into a scene.\n\n{text}")
     typer.echo(f"{out}: {', '.join(tables)}; put the tables into a scene")
     for note in notes:
         typer.echo(note)

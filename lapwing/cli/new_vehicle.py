@@ -10,6 +10,7 @@ import typer
 from lapwing.cli.new_command import new
 from lapwing.cosim.processes.interrupt import Interrupted
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.studies.complete_file import write_text
 
 if TYPE_CHECKING:
     from lapwing.vehicle_measurements import Figure
@@ -95,7 +96,7 @@ def write_vehicle(
     except ValueError as error:  # a remark about a unit may name the cause
         raise ValueError("; ".join([str(error), *remarks])) from None
     path.parent.mkdir(exist_ok=True)
-    path.write_text(airframe_text(name, values, own), encoding="utf-8")
+    write_text(path, airframe_text(name, values, own))
     warning = f"its thrust is {thrust_to_weight:.2f} times its weight; control authority is small below {WEAK:g}"
     return path, [*remarks, warning] if thrust_to_weight < WEAK else remarks
 

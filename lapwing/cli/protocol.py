@@ -9,6 +9,7 @@ from lapwing.cli.app import app
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import claim
 from lapwing.cli.preflight import with_solver_selected
+from lapwing.studies.complete_file import write_text
 
 
 @app.command()
@@ -40,7 +41,7 @@ def protocol(
 
         draw(setup, plot)
     if json:
-        json.write_text(json_module.dumps(result, indent=1) + "\n", encoding="utf-8")
+        write_text(json, json_module.dumps(result, indent=1) + "\n")
     if json or plot:
         return
     typer.echo(f"{result['rate']} Hz, {result['interval_ns']} ns per tick, last tick {result['last_tick']}")

@@ -9,6 +9,7 @@ import typer
 
 from lapwing.cli.app import app
 from lapwing.cli.output_paths import claim
+from lapwing.studies.complete_file import write_text
 
 
 class Kind(Enum):
@@ -32,7 +33,7 @@ def schema(
         typer.echo(text, nl=False)
     else:
         claim(out)
-        out.write_text(text, encoding="utf-8")
+        write_text(out, text)
 
 
 @app.command()

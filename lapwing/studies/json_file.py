@@ -5,10 +5,12 @@ import math
 from pathlib import Path
 from typing import Any
 
+from lapwing.studies.complete_file import write_text
+
 
 def write_json(path: Path, data: Any) -> None:
     """Write data: NamedTuples become objects, arrays become lists, and numbers that are not finite become null."""
-    path.write_text(json.dumps(_plain(data), indent=2, allow_nan=False) + "\n", encoding="utf-8")
+    write_text(path, json.dumps(_plain(data), indent=2, allow_nan=False) + "\n")
 
 
 def _plain(value: Any) -> Any:

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+import lapwing
 from lapwing.cosim.log import LogReader
 
 pytestmark = pytest.mark.long
@@ -52,3 +53,27 @@ def test_log_without_anything_flown_is_not_left(tmp_path):
     done = run(tmp_path, 20_000, "single-process")
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.fixture(scope="module")
+def log(tmp_path_factory):
+    return lapwing.fly("hover").save(tmp_path_factory.mktemp("full") / "hover.mcap")
+
+
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        (("report", "LOG", "--out", "a.html"), "a.html"),
+        (("report", "LOG", "--out", "a.pdf"), "a.pdf"),
+        (("schema", "scene", "--out", "a.json"), "a.json"),
+        (("protocol", "hover", "--json", "a.json"), "a.json"),
+        (("report", "LOG", "--out", "a.png"), "a.png"),
+    ],
+)
+def test_output_without_room_leaves_former_file(tmp_path, log, words, name):
+    (tmp_path / name).write_text("former file")
+    command = [sys.executable, "-m", "lapwing", *(str(log) if word == "LOG" else word for word in words)]
+    limited = ["sh", "-c", 'ulimit -f 2; exec "$@"', "sh", *command]
+    done = subprocess.run(limited, capture_output=True, text=True, check=False, cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (2, f"lapwing: {name}: cannot be written: file too large\n")
+    assert {file.name: file.read_text() for file in tmp_path.iterdir()} == {name: "former file"}

@@ -1,8 +1,11 @@
 """`lapwing render`: films and pictures of the 3D view, from the command as a process."""
 
+import os
 import shutil
+import signal
 import subprocess
 import sys
+import time
 
 import numpy as np
 import pytest
@@ -102,7 +105,7 @@ def test_animation_has_its_pictures_and_length(tmp_path, name):
     from PIL import Image
 
     pictures = [Image.new("RGB", (160, 120), (60 * k, 90, 120)) for k in range(3)]
-    write_film(tmp_path / name, iter(pictures), Shot(rate=4.0, size=(160, 120)))
+    write_film(tmp_path / name, name[1:], iter(pictures), Shot(rate=4.0, size=(160, 120)))
     film = Image.open(tmp_path / name)
     durations = []
     for k in range(film.n_frames):
@@ -130,3 +133,21 @@ def test_command_writes_animation_of_moving_vehicle(log, name):
     assert pictures[0][2, 80, 2] - pictures[0][2, 80, 0] > 40.0  # blue sky
     assert np.ptp(pictures[0][40:80, 60:100].mean(axis=2)) > 60.0  # the vehicle
     assert np.abs(pictures[0] - pictures[-1]).mean() > 0.05  # which moves
+
+
+@pytest.mark.long
+@pytest.mark.skipif(headless.PROGRAM is None, reason="needs Chromium")
+def test_interrupted_film_leaves_former_file(log, tmp_path):
+    name = "c.mp4"
+    (tmp_path / name).write_text("former film")
+    words = [sys.executable, "-m", "lapwing", "render", str(log), "--out", name, *SMALL, "--fps", "120", "--speed", "1"]
+    with subprocess.Popen(
+        words, cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+    ) as command:
+        while command.poll() is None and not list(tmp_path.glob(f".{name}*")):
+            time.sleep(0.05)
+        os.killpg(command.pid, signal.SIGINT)  # as a terminal does
+        _, err = command.communicate()
+    lines = [line for line in err.replace("\r", "\n").splitlines() if "pictures" not in line and line.strip()]
+    assert (command.returncode, lines) == (130, ["lapwing: ended by SIGINT"])
+    assert {file.name: file.read_text() for file in tmp_path.iterdir()} == {name: "former film"}

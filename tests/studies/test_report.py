@@ -310,7 +310,8 @@ def test_same_plots_on_paper(log, page, tmp_path):
 
 def test_paper_has_outcome_errors_facts_and_every_plot(log, page, monkeypatch, tmp_path):
     written = []
-    monkeypatch.setattr(paper, "write_pdf", lambda path, *content: written.append(content))
+    write_pdf = paper.write_pdf
+    monkeypatch.setattr(paper, "write_pdf", lambda path, *content: [written.append(content), write_pdf(path, *content)])
     flight = FlightData.read(log)
     write(flight, tmp_path / "circle.pdf")
     ((first, plots),) = written
@@ -599,7 +600,7 @@ def test_unwritable_report_error_is_one_line(log, tmp_path):
     copy = tmp_path / "a.mcap"
     copy.write_bytes(log.read_bytes())
     copy.with_suffix(".html").mkdir()
-    with pytest.raises(ValueError, match=r"a\.html: cannot write the report: "):
+    with pytest.raises(ValueError, match=r"a\.html: cannot be written: "):
         report(copy)
 
 

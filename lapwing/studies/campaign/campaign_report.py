@@ -7,6 +7,7 @@ from pathlib import Path
 from lapwing.cosim.output_lock import write_errors
 from lapwing.studies.campaign import campaign_plots, console_output
 from lapwing.studies.campaign.results import Results
+from lapwing.studies.complete_file import complete_file
 from lapwing.studies.report.matplotlib_figure import write_png
 from lapwing.studies.report.page import render
 from lapwing.studies.report.paper import Cover, Titled, write_pdf
@@ -33,15 +34,15 @@ def write(path: Path, results: Results) -> None:
         ValueError: the file cannot be written.
     """
     sections = [_section(title, draw, results) for title, draw in PLOTS.items()]
-    with write_errors(path):
+    with write_errors(path), complete_file(path) as file:
         if path.suffix == ".html":
-            path.write_text(_page(results, sections), encoding="utf-8")
+            file.write_text(_page(results, sections), encoding="utf-8")
         else:
             titled_plots = [Titled(section.title, section.plot) for section in sections if section.plot]
             if path.suffix == ".pdf":
-                write_pdf(path, _cover(results), titled_plots)
+                write_pdf(file, _cover(results), titled_plots)
             else:
-                write_png(path, [titled.plot for titled in titled_plots])
+                write_png(file, [titled.plot for titled in titled_plots])
 
 
 def _section(title: str, draw: Callable[[Results], Plot], results: Results) -> Section:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from lapwing.cosim.log import LogWriter
+from lapwing.cosim.output_lock import write_errors
 from lapwing.messages.topics import (
     ACTUATORS,
     AIRSPEED,
@@ -123,9 +124,13 @@ def write_log(path: Path, flight: Recording, source: str) -> None:
         "unknown_topics": ", ".join(flight.unknown),
     }
     messages = heapq.merge(_motion(flight), *_readings(flight), key=lambda entry: entry[0])
-    with complete_file(path) as file, LogWriter(file, metadata, {}) as log:
-        for time_ns, topic, message in messages:
-            log.write(topic.key(VEHICLE), type(message), message.encode(), time_ns)
+    with write_errors(path), complete_file(path) as file:
+        try:
+            with LogWriter(file, metadata, {}) as log:
+                for time_ns, topic, message in messages:
+                    log.write(topic.key(VEHICLE), type(message), message.encode(), time_ns)
+        except ValueError as error:
+            raise ValueError(str(error).replace(str(file), str(path))) from None
 
 
 def _motion(flight: Recording) -> Iterator[tuple[int, Topic, Any]]:

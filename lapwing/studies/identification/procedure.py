@@ -14,6 +14,7 @@ import numpy as np
 from lapwing.cosim.scene import Overrides, Scene
 from lapwing.services.common.vehicle_schema import VehicleAirframe
 from lapwing.services.scene_resolver import load_one
+from lapwing.studies.complete_file import write_text
 from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.identification.flight_parameters import apply_flight_parameters, is_flight_parameter
 from lapwing.studies.identification.output_error import HORIZONS, Fit, OutputError
@@ -95,7 +96,7 @@ def identify(
     def store(step: int, values: np.ndarray, cost: float) -> None:
         report(f"loss {cost:.4g}", step, most)
         if progress:
-            progress.write_text(json.dumps({"stamp": stamp, "values": values.tolist()}), encoding="utf-8")
+            write_text(progress, json.dumps({"stamp": stamp, "values": values.tolist()}))
 
     fit = problem.solve(begin, most, store)
     test_flights = held_out or used
@@ -137,7 +138,7 @@ def write_airframe(
         lines += [f"#   {key} = {value:.9g}" for key, value in others.items()]
     text = "\n".join(lines) + "\n\n" + dump(table)
     tomllib.loads(text)
-    path.write_text(text, encoding="utf-8")
+    write_text(path, text)
 
 
 def start_value(scene: Scene, key: str) -> float:

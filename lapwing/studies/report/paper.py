@@ -2,6 +2,7 @@
 
 import textwrap
 from collections.abc import Iterable, Sequence
+from io import BytesIO
 from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -44,17 +45,18 @@ class Titled(NamedTuple):
 
 def write_pdf(path: Path, cover: Cover, plots: Iterable[Titled]) -> None:
     """Write the cover, then as many plots per page as fit, on numbered pages of equal size."""
-    packed = _paginate(plots)
+    packed, document = _paginate(plots), BytesIO()  # PdfPages cannot be closed on a full disk
     with (
         plot_style(),
         rc_context({"font.size": FONT, "axes.titlesize": FONT}),
-        PdfPages(path, metadata={"CreationDate": None}) as out,
+        PdfPages(document, metadata={"CreationDate": None}) as out,
     ):
         for number, sheet in enumerate(chain([_cover(cover)], map(_page, packed)), 1):
             text = f"{cover.title} · page {number} of {1 + len(packed)}"
             sheet.text(1.0 - MARGIN / PAGE[0], 0.5 * MARGIN / PAGE[1], text, ha="right", fontsize=7, color=QUIET)
             show_dollars(sheet)
             out.savefig(sheet)
+    path.write_bytes(document.getvalue())
 
 
 def _paginate(plots: Iterable[Titled]) -> list[list[Titled]]:

@@ -1,9 +1,10 @@
 """Output of a report in the format of the file name's extension."""
 
 from collections.abc import Sequence
-from contextlib import suppress
 from pathlib import Path
 
+from lapwing.cosim.output_lock import write_errors
+from lapwing.studies.complete_file import complete_file
 from lapwing.studies.flight_data import FlightData
 
 FORMATS = (".html", ".pdf", ".png")
@@ -22,15 +23,13 @@ def write(flights: FlightData | Sequence[FlightData], target: Path, view3d: bool
     """
     flight_list = [flights] if isinstance(flights, FlightData) else list(flights)
     check_format(target)
-    try:
+    with write_errors(target), complete_file(target) as file:
         if target.suffix == ".html":
             from lapwing.studies.report.page import flight_page
             from lapwing.studies.view3d import available
 
-            target.write_text(
-                flight_page(flight_list, view3d and available() and all(flight.located for flight in flight_list)),
-                encoding="utf-8",
-            )
+            located = all(flight.located for flight in flight_list)
+            file.write_text(flight_page(flight_list, view3d and available() and located), encoding="utf-8")
         else:
             from lapwing.studies.report.sections import sections
 
@@ -39,15 +38,11 @@ def write(flights: FlightData | Sequence[FlightData], target: Path, view3d: bool
                 from lapwing.studies.report.flight_cover import cover
                 from lapwing.studies.report.paper import Titled, write_pdf
 
-                write_pdf(target, cover(flight_list), [Titled(s.title, s.plot) for s in drawable if s.plot])
+                write_pdf(file, cover(flight_list), [Titled(s.title, s.plot) for s in drawable if s.plot])
             else:
                 from lapwing.studies.report.matplotlib_figure import write_png
 
-                write_png(target, [s.plot for s in drawable if s.plot])
-    except OSError as fault:
-        with suppress(OSError):
-            target.unlink(missing_ok=True)  # no partial file
-        raise ValueError(f"{target}: cannot write the report: {fault.strerror or fault}") from None
+                write_png(file, [s.plot for s in drawable if s.plot])
     return target
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lapwing.cosim.output_lock import write_errors
+from lapwing.studies.complete_file import write_text
 from lapwing.studies.report import plot as report
 from lapwing.studies.report.page import render
 from lapwing.studies.report.sections import Section
@@ -29,8 +29,7 @@ def write(path: Path, results: Sequence[Result]) -> None:
         verdict=verdict,
         distance=distance,
     )
-    with write_errors(path):
-        path.write_text(text, encoding="utf-8")
+    write_text(path, text)
 
 
 def _sections(results: Sequence[Result]) -> Iterator[Section]:

@@ -15,6 +15,7 @@ from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.run_schema import follows_trajectory
 from lapwing.services.common.vehicle_schema import Vehicle
 from lapwing.studies.campaign.campaign_config import campaign_setup
+from lapwing.studies.complete_file import write_text
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.tune import corners, gain_refinement
 from lapwing.studies.tune.bandwidths import Bandwidths
@@ -123,4 +124,4 @@ def write(path: Path, gains: GainSet) -> None:
             value = list(value)
         text = f'"{value}"' if isinstance(value, str) else str(value).lower()
         lines.append(f"{key} = {text}")
-    path.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    write_text(path, "\n".join(lines) + "\n")

@@ -7,6 +7,7 @@ from typing import Any
 import control
 import numpy as np
 
+from lapwing.studies.complete_file import write_text
 from lapwing.studies.report.page import render
 from lapwing.studies.report.plot import Level, Line, Panel, Plot
 from lapwing.studies.report.sections import Section
@@ -39,7 +40,7 @@ def write(path: Path, tuning: Tuning) -> None:
         "tuning.html", title=f"{tuning.scene}: gains", tables=list(tables(tuning)), sections=sections,
         gains=tuning.gains, outcome=_outcome(tuning), failed=bool(tuning.failures),
     )  # fmt: skip
-    path.write_text(page, encoding="utf-8")
+    write_text(path, page)
 
 
 def _outcome(tuning: Tuning) -> str:

@@ -4,6 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
+from lapwing.studies.complete_file import write_text
 from lapwing.studies.report.page import render
 from lapwing.studies.report.plot import Line, Panel, Plot
 from lapwing.studies.report.sections import Section
@@ -37,7 +38,7 @@ def write(path: Path, validation: Validation) -> None:
         outcome=_outcome(validation), sections=sections,
         tables=[_errors(validation), _explained_shares(validation), *_loops(validation), _flights(validation)],
     )  # fmt: skip
-    path.write_text(page, encoding="utf-8")
+    write_text(path, page)
 
 
 def _outcome(validation: Validation) -> str:

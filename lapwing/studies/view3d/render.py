@@ -4,12 +4,13 @@ import base64
 import io
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from lapwing.cosim.output_lock import write_errors
+from lapwing.studies.complete_file import complete_file
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.view3d import require
 from lapwing.studies.view3d.headless import Browser
@@ -102,12 +103,8 @@ def render(
         with Browser(address, size=shot.size) as browser:
             browser.run(f"{START} lapwingView.look({shot.camera!r}, 0, {_list(shot.place)});")
             pictures = _pictures(browser, times, target.suffix == ".png", progress)
-            try:
-                write_film(target, pictures, shot)
-            except OSError as fault:
-                with suppress(OSError):
-                    target.unlink(missing_ok=True)
-                raise ValueError(f"{target}: cannot be written: {fault.strerror or fault}") from None
+            with write_errors(target), complete_file(target) as file:
+                write_film(file, target.suffix, pictures, shot)
     return target
 
 
@@ -134,28 +131,36 @@ def _pictures(browser: Browser, times: np.ndarray, lossless: bool, progress: Any
         progress(k + len(batch), len(times))
 
 
-def write_film(target: Path, pictures: Iterator[Any], shot: Shot) -> None:
-    """Write PIL images as a video, or the first one as an image."""
-    if target.suffix == ".mp4":
-        import imageio_ffmpeg
-
-        options = {"quality": 7, "macro_block_size": 2, "output_params": ["-preset", "veryfast"]}
-        writer = imageio_ffmpeg.write_frames(str(target), shot.size, fps=shot.rate, **options)
-        writer.send(None)
-        for picture in pictures:
-            writer.send(np.ascontiguousarray(picture))
-        writer.close()
+def write_film(file: Path, suffix: str, pictures: Iterator[Any], shot: Shot) -> None:
+    """Write PIL images as a video in the format of `suffix`, or the first one as an image."""
+    if suffix == ".mp4":
+        _encode(file, pictures, shot)
         return
-    first = next(pictures)
-    if target.suffix == ".png":
-        first.save(target)
+    first, kind = next(pictures), suffix[1:]
+    if kind == "png":
+        first.save(file, kind)
         return
     timing = {"save_all": True, "duration": round(1000.0 / shot.rate), "loop": 0}
-    if target.suffix == ".webp":
-        first.save(target, append_images=pictures, quality=QUALITY, method=3, **timing)
+    if kind == "webp":
+        first.save(file, kind, append_images=pictures, quality=QUALITY, method=3, **timing)
         return
     rest = (picture.quantize(128, dither=0) for picture in pictures)  # each with an individual palette
-    first.quantize(128, dither=0).save(target, append_images=rest, **timing)
+    first.quantize(128, dither=0).save(file, kind, append_images=rest, **timing)
+
+
+def _encode(file: Path, pictures: Iterator[Any], shot: Shot) -> None:
+    import imageio_ffmpeg
+
+    output = ["-preset", "veryfast", "-f", "mp4"]
+    options = {"quality": 7, "macro_block_size": 2, "ffmpeg_log_level": "error", "output_params": output}
+    writer = imageio_ffmpeg.write_frames(str(file), shot.size, fps=shot.rate, **options)
+    writer.send(None)
+    try:
+        for picture in pictures:
+            writer.send(np.ascontiguousarray(picture))
+    except BaseException as fault:
+        writer.throw(fault)  # an interrupt kills the encoder
+    writer.close()
 
 
 def _list(place: tuple[float, float, float] | None) -> str:

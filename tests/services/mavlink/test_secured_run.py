@@ -19,7 +19,7 @@ from lapwing.services.mavlink.signing import read_key
 pytestmark = pytest.mark.long
 
 ARM, TAKEOFF = mavlink.MAV_CMD_COMPONENT_ARM_DISARM, mavlink.MAV_CMD_NAV_TAKEOFF
-DURATION = 20  # [s] simulated
+DURATION = 60  # [s] simulated, 15 s on the clock: a client may be starved
 
 
 @pytest.fixture(autouse=True)

@@ -49,6 +49,20 @@ def test_command_writes_log_that_other_commands_read(flight, tmp_path):
     assert run("report", out, "--out", tmp_path / "flight.html").returncode == 0
 
 
+@pytest.mark.long
+def test_import_without_room_leaves_former_log(flight, tmp_path):
+    source = write_csv(tmp_path / "flight.csv", flight)
+    (tmp_path / "out").mkdir()
+    out = tmp_path / "out" / "flight.mcap"
+    out.write_text("former log")
+    command = [sys.executable, "-m", "lapwing", "import", str(source), "--mapping", "nanobench", "--out", str(out)]
+    done = subprocess.run(
+        ["sh", "-c", 'ulimit -f 2; exec "$@"', "sh", *command], capture_output=True, text=True, check=False
+    )
+    assert (done.returncode, done.stderr) == (2, f"lapwing: {out}: cannot write the log: File too large\n")
+    assert {file.name: file.read_text() for file in out.parent.iterdir()} == {"flight.mcap": "former log"}
+
+
 def broken(path, text):
     path.write_bytes(text)
     return path
