@@ -1,4 +1,4 @@
-"""A scripted Betaflight SITL: answers each state packet with motor outputs, and MSP status requests.
+"""Scripted Betaflight SITL: answers each state packet with motor outputs, and MSP status requests.
 
 Written from the interface description and checked against the traffic of the real firmware: one motor packet for each
 state packet, outputs 0 while disarmed, 0.055 when armed at low throttle.
@@ -48,11 +48,11 @@ class Peer:
     Attributes:
         states: unpacked state packets.
         channels: newest RC channels.
-        early: True if RC channels came before a request for the status, which makes the firmware deaf to RC.
+        early: True if RC channels came before a request for the status, after which the firmware ignores RC.
     """
 
     def __init__(self, first, answer=None, blockers=0):
-        """Listen from port `first` + 1; `answer(n, own)` replaces the peer's motor packet by a list of packets."""
+        """Listen from port `first` + 1; `answer(n, own)` returns the packets to send instead of the motor packet."""
         self._first, self._answer, self._blockers = first, answer, blockers
         self.states, self.channels, self.early = [], (1000,) * 16, False
         self._asked = False
