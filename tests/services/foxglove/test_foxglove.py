@@ -1,4 +1,4 @@
-"""Data of a Foxglove WebSocket client: topics, unchanged payloads, time."""
+"""Foxglove WebSocket server: topics, unchanged payloads, time, access."""
 
 import re
 import signal
