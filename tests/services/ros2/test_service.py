@@ -1,4 +1,4 @@
-"""A run as a node of a ROS 2 graph, observed and commanded by zenoh-ros2-sdk, an independent client."""
+"""Run as a node of a ROS 2 graph, observed and commanded by zenoh-ros2-sdk, an independent client."""
 
 import os
 import queue
@@ -133,7 +133,7 @@ def test_ros_nodes_observe_and_command_run(tmp_path, port, graph):
         while received[-1].header.stamp.sec < 13:
             received.append(poses.get(timeout=PATIENCE))
             if received[-1].header.stamp.sec >= 6:  # the estimator has settled
-                if poses.empty():  # not for every queued message
+                if poses.empty():  # one command at a time, not one for every queued message
                     target.publish(header=received[-1].header, pose=there)
                 if not started and received[-1].header.stamp.nanosec > 500_000_000:
                     started = True
