@@ -6,8 +6,8 @@ LAPWING_BETAFLIGHT=PATH python -m tests.services.firmware_figures betaflight
 
 python -m tests.services.firmware_figures ardupilot --scripted --set run.duration=15
 
-Each start is a `lapwing run` of the scene with its own program; `--set KEY=VALUE` goes to it. With `--scripted` the
-program is the scripted one of the tests: then the CPU time of Lapwing per exchange counts, not its share.
+Each start is a `lapwing run` of the scene that starts a new program; it receives `--set KEY=VALUE`. `--scripted` starts
+the scripted program of the tests: its CPU time per exchange is meaningful, the share of Lapwing is not.
 """
 
 import argparse
@@ -100,7 +100,7 @@ def figures(log: Path, summary: Path, full: float) -> dict:
         "share": float(cpu[1]) / float(cpu[2]) if cpu else math.nan,
         "own_us": 1e6 * float(cpu[1]) / steps if cpu else math.nan,  # CPU time of an exchange
         "firmware_us": 1e6 * float(cpu[2]) / steps if cpu else math.nan,
-        "load": os.getloadavg()[0],  # of the last minute
+        "load": os.getloadavg()[0],  # average of the last minute
         "digest": result["digest"],
     }
 
