@@ -137,14 +137,14 @@ def main() -> None:
         results.append(fly(inputs.firmware, program, folder, f"flight_{k}", *options))
         print(json.dumps(results[-1]), flush=True)
     landed = [r for r in results if r["outcome"] == "landed"]
-    flown = [r for r in results if r["outcome"] != "failed"] if inputs.scripted else landed
+    completed = [r for r in results if r["outcome"] != "failed"] if inputs.scripted else landed
     print(f"{len(landed)} of {len(results)} landed; hover by the airframe {hover_duty(f'{inputs.firmware}_quad'):.4f}")
     for name in ("landing", "off_rms", "off_max", "hover", "steps", "skew", "missed", "waiting", "factor", "share",
                  "own_us", "firmware_us", "load"):  # fmt: skip
-        values = [r[name] for r in flown]
+        values = [r[name] for r in completed]
         if values:
             print(f"{name:8} mean {np.mean(values):.4g}, least {min(values):.4g}, greatest {max(values):.4g}")
-    print(f"{len({r['digest'] for r in flown})} different digests in {len(flown)} flights; logs in {folder}")
+    print(f"{len({r['digest'] for r in completed})} different digests in {len(completed)} flights; logs in {folder}")
 
 
 if __name__ == "__main__":

@@ -45,14 +45,14 @@ def test_direct_voltages_are_held_limited_and_time_out(tmp_path):
     with LogReader(log) as read:
         times, actuators = read.history("/drone1/actuators")
         _, truth = read.history("/drone1/ground_truth")
-        stated = read.metadata["digest"]
+        digest = read.metadata["digest"]
     direct = (times >= 3_000_000_000) & (times < 3_100_000_000)
     highest = setup.services["autopilot"].parameters.airframe.voltage_max
     assert np.array_equal(np.unique(actuators["motor_voltage"][direct], axis=0), [[7.0, 8.0, 0.0, highest]])
     assert not np.array_equal(actuators["motor_voltage"][times == 3_100_000_000][0], [7.0, 8.0, 0.0, highest])
     assert np.ptp(truth["angular_velocity"][direct], axis=0).max() > 0.5  # the voltages disturbed the vehicle
     assert np.abs(truth["velocity"][-1]).max() < 0.1  # at rest again
-    assert resimulate(log) == (stated, stated)
+    assert resimulate(log) == (digest, digest)
 
 
 def test_missing_voltages_trigger_failsafe():

@@ -28,8 +28,8 @@ PATIENCE = 120.0  # [s] for the run to compile and start
 
 @pytest.fixture
 def port():
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        return taken.getsockname()[1]
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return server.getsockname()[1]
 
 
 @pytest.fixture
@@ -235,7 +235,7 @@ def test_ros_nodes_observe_distributed_run(tmp_path, port, graph):
     common = ["groundstation", *sets, "--set", "success.require=[]", "--endpoints", table, "--key-prefix", "elsewhere"]
     log = ["--log", str(tmp_path / "a.mcap")]
     graph_at = ["--ros2", str(DOMAIN), "--ros2-router", f"127.0.0.1:{port}"]
-    own = {"plant": ["--speed", "1"], "recorder": log, ROS2: graph_at}
+    options = {"plant": ["--speed", "1"], "recorder": log, ROS2: graph_at}
     lapwing, pipe = [sys.executable, "-m", "lapwing"], subprocess.PIPE
     started = []
 
@@ -245,10 +245,10 @@ def test_ros_nodes_observe_distributed_run(tmp_path, port, graph):
         return started[-1]
 
     try:
-        node = start("service", ROS2, *own[ROS2])
+        node = start("service", ROS2, *options[ROS2])
         await_listener(node, port)
         for name in names[:-1]:
-            start("service", name, *own.get(name, []))
+            start("service", name, *options.get(name, []))
         run = start("run", *log)
         clock, events = graph.subscribe("/clock", Clock), graph.subscribe("/drone1/events", Log)
         arm, requested = graph.publisher("/drone1/command/arm", Bool), False
