@@ -6,8 +6,8 @@ LAPWING_BETAFLIGHT=PATH python -m tests.services.firmware_figures betaflight
 
 python -m tests.services.firmware_figures ardupilot --scripted --set run.duration=15
 
-Each start is a `lapwing run` of the scene with its own program; `--set KEY=VALUE` goes to it. With `--scripted` the
-program is the scripted one of the tests: then the CPU time of Lapwing per exchange counts, not its share.
+Each start is a `lapwing run` of the scene that starts a new program; it receives `--set KEY=VALUE`. `--scripted` starts
+the scripted program of the tests: its CPU time per exchange is meaningful, the share of Lapwing is not.
 """
 
 import argparse
@@ -100,7 +100,7 @@ def figures(log: Path, summary: Path, full: float) -> dict:
         "share": float(cpu[1]) / float(cpu[2]) if cpu else math.nan,
         "own_us": 1e6 * float(cpu[1]) / steps if cpu else math.nan,  # CPU time of an exchange
         "firmware_us": 1e6 * float(cpu[2]) / steps if cpu else math.nan,
-        "load": os.getloadavg()[0],  # of the last minute
+        "load": os.getloadavg()[0],  # average of the last minute
         "digest": result["digest"],
     }
 
@@ -137,14 +137,14 @@ def main() -> None:
         results.append(fly(inputs.firmware, program, folder, f"flight_{k}", *options))
         print(json.dumps(results[-1]), flush=True)
     landed = [r for r in results if r["outcome"] == "landed"]
-    flown = [r for r in results if r["outcome"] != "failed"] if inputs.scripted else landed
+    completed = [r for r in results if r["outcome"] != "failed"] if inputs.scripted else landed
     print(f"{len(landed)} of {len(results)} landed; hover by the airframe {hover_duty(f'{inputs.firmware}_quad'):.4f}")
     for name in ("landing", "off_rms", "off_max", "hover", "steps", "skew", "missed", "waiting", "factor", "share",
                  "own_us", "firmware_us", "load"):  # fmt: skip
-        values = [r[name] for r in flown]
+        values = [r[name] for r in completed]
         if values:
             print(f"{name:8} mean {np.mean(values):.4g}, least {min(values):.4g}, greatest {max(values):.4g}")
-    print(f"{len({r['digest'] for r in flown})} different digests in {len(flown)} flights; logs in {folder}")
+    print(f"{len({r['digest'] for r in completed})} different digests in {len(completed)} flights; logs in {folder}")
 
 
 if __name__ == "__main__":

@@ -39,7 +39,7 @@ def firmware_setup(firmware, own, instance, **changes):
 
 
 class Background:
-    """Function in a thread; `join` raises its exception."""
+    """Function that runs in a thread; `join` raises its exception."""
 
     def __init__(self, function, *arguments):
         """Start the thread."""

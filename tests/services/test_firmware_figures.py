@@ -1,4 +1,4 @@
-"""Figures of flights with firmwares: geometry of the square, output in hover, a scripted flight."""
+"""Script `firmware_figures`: geometry of the square, output in hover, a scripted flight."""
 
 import json
 import math

@@ -1,4 +1,4 @@
-"""Recorder: messages are complete_pages once every service has published their ticks, and none is lost."""
+"""Recorder: a tick is complete after every service has published it; no message is lost."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""A client outside of the run receives its messages through the router, but cannot send any."""
+"""Router: a client outside of the run receives messages, but cannot send any."""
 
 import subprocess
 import sys
@@ -120,4 +120,4 @@ def test_stalled_viewer_does_not_block_run(tmp_path):
         viewer.close()
     assert run.returncode == 0, output
     assert f"{PREFIX}/drone1/pose" in keys, output
-    assert not [key for key in keys if key.startswith(f"{PREFIX}/_")]  # whose senders wait for all subscribers
+    assert not [key for key in keys if key.startswith(f"{PREFIX}/_")]  # senders of these keys wait for all subscribers

@@ -1,7 +1,7 @@
 """Scripted ArduPilot: the other side of the JSON interface, written from its description.
 
-It sends a servo packet, waits for the state, and sends the packet again if none comes. It reads the state by searching
-for keys, as ArduPilot does: a message that only a JSON parser understands does not reach it.
+It sends a servo packet, waits for the state, and sends the packet again if no state arrives. It reads the state by a
+search for keys, as ArduPilot does: it cannot read a message that only a JSON parser understands.
 """
 
 import re

@@ -1,6 +1,6 @@
-"""Replacement of ArduPilot in complete runs: climbs to 2 m, descends and stops the motors.
+"""Scripted replacement of ArduPilot for complete runs: climbs to 2 m, descends and stops the motors.
 
-It is started as `python scripted_ardupilot.py --instance N ...`. With `--die` it ends in the air.
+Started as `python scripted_ardupilot.py --instance N ...`. With `--die` it exits in flight.
 """
 
 import argparse

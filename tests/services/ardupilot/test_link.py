@@ -97,7 +97,7 @@ def test_frame_resent_before_answer_does_not_delay_later_steps(link):
 
     def script(peer):
         peer.exchange()
-        for _ in range(2):  # frame 1 comes three times before its answer
+        for _ in range(2):  # the peer sends frame 1 three times before it is answered
             peer.send(servo_packet(1))
         return [peer.exchange()["timestamp"][0] for _ in range(5)]
 
@@ -174,8 +174,8 @@ def test_restarted_firmware_with_new_address_takes_over(link):
     assert states[0]["timestamp"][0] >= 0.004 - 1e-6  # the plant continues from its state
 
 
-def test_restarted_firmware_is_connected_to_before_its_first_frame(link):
-    """ArduPilot starts only once a client has connected to its first MAVLink port, also when it starts again."""
+def test_mavlink_client_connects_to_restarted_firmware(link):
+    """ArduPilot waits at every start until a client has connected to its first MAVLink port."""
 
     def script(peer):
         peer.exchange()
@@ -210,7 +210,7 @@ def test_absent_firmware_is_reported(link):
 
 
 def test_mavlink_port_is_tried_until_it_listens(link):
-    """ArduPilot starts only once a client has connected to its first MAVLink port."""
+    """ArduPilot waits at its start until a client has connected to its first MAVLink port."""
 
     def script(peer):
         time.sleep(1.0)

@@ -18,7 +18,7 @@ def packet(count=1, pwm=(1000,) * 16, magic=18458, rate=1200):
 
 
 def yawed(yaw):
-    """Attitude of a nose that points `yaw` [rad] from east to the left."""
+    """Return the attitude with a yaw of `yaw` [rad], counter-clockwise from east."""
     return math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)
 
 

@@ -1,4 +1,4 @@
-"""GPS outages and the battery of the scene reach ArduPilot as parameters of its simulation."""
+"""GPS outages and battery voltage of a scene, sent to ArduPilot as parameters of its simulation."""
 
 import math
 
@@ -68,11 +68,11 @@ def test_battery_voltage_is_set_every_fifth_of_second():
     assert result == [("SIM_BATT_VOLTAGE", 11.35)] * 2  # ArduPilot subtracts 0.7 V times the throttle
 
 
-def test_battery_without_effect_is_left_to_ardupilot():
+def test_scene_without_battery_sets_no_voltage():
     assert fly((0.0, 1.0, 2.0)) == []
 
 
-def test_receiver_of_scene_is_an_input():
+def test_gps_of_scene_is_input_of_link():
     assert not resolve(load("ardupilot_quad")).services["ardupilot"].parameters.own.gps
     config = resolve(load("ardupilot_quad", ["sensors.gps.rate=5"])).services["ardupilot"]
     assert config.parameters.own.gps

@@ -20,21 +20,21 @@ VIEW = CommanderInput(
 
 
 class Session:
-    """A commander and its inputs."""
+    """Commander with the inputs of a hovering vehicle."""
 
     def __init__(self, constants=CONSTANTS):
         self.commander = Commander(constants)
         self.texts, self.acknowledgements = [], []
 
     def step(self, **inputs):
-        """Return the output after a tick with these inputs; the others are those of a hovering vehicle."""
+        """Step one tick with these inputs changed. Return the output."""
         output = self.commander.step(VIEW._replace(**inputs))
         self.texts += output.texts
         self.acknowledgements += output.acknowledgements
         return output
 
     def run(self, seconds, **inputs):
-        """Return the last output after a time [s]."""
+        """Step for a time [s]. Return the last output."""
         for _ in range(round(seconds / DT)):
             output = self.step(**inputs)
         return output

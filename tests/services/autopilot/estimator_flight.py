@@ -19,7 +19,7 @@ from lapwing.services.sensors.registry import sensors
 from lapwing.services.sensors.sensor_inputs import Truth
 
 INTERVAL = 0.004  # [s]
-STAND = 3.0  # [s] on the ground first
+STAND = 3.0  # [s] at rest on the ground before the flight
 REST = 0.35  # [m] height of the body's origin on the ground
 HOME, AIR, FIELD = STANDARD.home, STANDARD.atmosphere, STANDARD.magnetic_field_world
 THETA, V, P = slice(0, 3), slice(3, 6), slice(6, 9)  # columns of the error: rotation vector, velocity, position
@@ -162,8 +162,8 @@ DEFAULT = sensor_parameters()
 class Flight(NamedTuple):
     """Records of a flight at 10 Hz."""
 
-    error: np.ndarray  # (n, 9) rotation vector [rad], velocity [m/s], position [m]: truth less estimate
-    covariance: np.ndarray  # (n, 9, 9) covariance of these in the filter
+    error: np.ndarray  # (n, 9) rotation vector [rad], velocity [m/s], position [m]: truth minus estimate
+    covariance: np.ndarray  # (n, 9, 9) the filter's covariance of these errors
     nis: np.ndarray  # (n, 6)
     health: np.ndarray  # (n,)
     rejected: np.ndarray  # (n,)

@@ -22,7 +22,7 @@ def item(action, x=NAN, y=NAN, z=NAN, yaw=NAN, radius=NAN, hold=0.0, values=()):
 
 
 def scripted(script):
-    """Return an operator of {time [s]: commands}; a key (start, end) repeats them at 10 Hz."""
+    """Return an operator for {time [s]: commands}; a key (start, end) repeats the commands at 10 Hz."""
 
     def operator(tick):
         result = []
@@ -56,13 +56,13 @@ UP_BY_SENSORS = {0.04: [command("takeoff", 4.0), command("arm", NAN, 10.0)]}
 
 
 def fly_by_sensors(seconds, script, *overrides):
-    """Return the recorded flight of the vehicle of `groundstation`, which climbs to 4 m in wind, on its sensors."""
+    """Fly the scene `groundstation` on sensor readings, with a climb to 4 m in wind. Return the recorded flight."""
     scene = load("groundstation", ["autopilot.follow_trajectory=false", f"run.duration={seconds}", *overrides])
     return memory_log.fly(scene, scripted(UP_BY_SENSORS | script))
 
 
 def error(flight, start):
-    """Return the largest error [m] of the estimated position from a time on."""
+    """Return the largest error [m] of the estimated position after the time `start` [s]."""
     estimated, true = (flight.column(t, lambda m: tuple(m.pose.position)) for t in ("estimate", "ground_truth"))
     times, true_times = flight.times("estimate"), flight.times("ground_truth")
     nearest = true[np.searchsorted(true_times, times).clip(0, len(true) - 1)]

@@ -86,7 +86,7 @@ def test_airmode_for_yaw_keeps_tilt_before_yaw_before_collective(collective, rol
     result = saturate(shares, q, TOP, AIRMODE_ROLL_PITCH_YAW)
     part, turn = largest(shares, q, AIRMODE_ROLL_PITCH_YAW)
     if not any(s[3] for s in shares):
-        turn = 1.0  # without yaw shares its value has no effect
+        turn = 1.0  # any value: without yaw shares it has no effect
     expected = (part * roll, part * pitch, turn * yaw)
     assert result[1:] == pytest.approx(expected, abs=1e-5)
     bare = np.array(mix(shares, result._replace(collective=0.0)))
@@ -96,7 +96,7 @@ def test_airmode_for_yaw_keeps_tilt_before_yaw_before_collective(collective, rol
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_torques_at_no_throttle(sign):
+def test_airmode_sets_axes_with_torque_at_zero_throttle(sign):
     def torques(q, mode):
         force, torque = wrench(mix(SHARES, saturate(SHARES, q, TOP, mode)))
         return force[2], *torque
@@ -116,7 +116,7 @@ def test_torques_at_no_throttle(sign):
         assert roll == pytest.approx(wrench(mix(SHARES, rolling))[1][0])
 
 
-def test_default_airmode_is_that_of_former_logs():
+def test_default_airmode_is_roll_pitch():
     assert airmode({}) == AIRMODE_ROLL_PITCH
     assert [airmode({"MC_AIRMODE": float(k)}) for k in range(3)] == list(ALL)
 

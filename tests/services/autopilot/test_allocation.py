@@ -129,7 +129,7 @@ def test_roll_and_pitch_are_kept_before_lift_and_lift_before_yaw(collective, rol
 
     tilt = np.array([(s[1] * roll + s[2] * pitch, s[0]) for s in shares if s[0] > 0.0])
     lifts = (-tilt[:, 0] / tilt[:, 1]).max(), ((TOP - tilt[:, 0]) / tilt[:, 1]).min()
-    if lifts[0] <= lifts[1]:  # some collective makes room for all of roll and pitch
+    if lifts[0] <= lifts[1]:  # a feasible collective leaves room for all of roll and pitch
         assert result[1:3] == (roll, pitch)
         assert result.collective == pytest.approx(np.clip(collective, *lifts), abs=1e-9)
     else:

@@ -111,7 +111,7 @@ def test_tuner_uses_nominal_airframe():
     assert result.spin_up_zero == pytest.approx(nominal.spin_up_zero, rel=0.15)
 
 
-def test_corner_of_tuner_has_more_thrust_of_every_rotor():
+def test_tuner_corner_scales_thrust_of_every_rotor():
     active = effects.from_scene({"rotor_thrust": {}, "coaxial_interference": {}}, airframe(load("hover", X8)))
     wash, rotor = (corners._stronger(e, 1.2) for e in active)
     assert wash.thrust_constant == rotor.thrust_constant == pytest.approx(1.2 * active[1].thrust_constant)

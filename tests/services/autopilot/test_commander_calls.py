@@ -1,4 +1,4 @@
-"""Flights with a commander called only at wake-ups are bit-for-bit those with one called at every tick."""
+"""Flights with a commander called only at wake-ups: bit-for-bit those with a call at every tick."""
 
 import pytest
 from flights import ENABLED, NAN, RATE, SCENE, command, inject, item

@@ -59,7 +59,7 @@ def test_position_error_tilts_thrust_at_any_heading(name, geometric, heading, di
 
 @SETS
 @LOOPS
-def test_tilts_turns_and_rates_are_opposed(name, geometric):
+def test_torque_opposes_tilt_yaw_error_and_rates(name, geometric):
     def reaction(angles=ZERO, omega=ZERO):
         return torque(command(name, (0.0, 0.0, 10.1), from_roll_pitch_yaw(*angles), 0.0, geometric, 1, omega).thrust)
 

@@ -44,7 +44,7 @@ def test_fix_before_impact_does_not_correct_impact():
     s = predict_ticks(predict_ticks(predict_ticks(s, 10), 1, force=(0.0, 0.0, 78.0)), 4)  # clipped at 8 g
     before = velocity_std(s)
     assert np.all(before > 0.4)
-    hit = velocity_fix(s, 0.0, 1)  # measured 0.1 s ago, 0.08 s before the impact
+    hit = velocity_fix(s, 0.0, 1)  # measured 0.1 s earlier, 0.08 s before the impact
     assert np.all(velocity_std(hit) > 0.99 * before)
     after = velocity_fix(predict_ticks(hit, 25), 1.0, 2)  # the first fix measured after it
     assert after.memory.rejected[filter_state.GPS_VELOCITY] == 0
@@ -61,7 +61,7 @@ def random_memory(rng):
 
 @pytest.mark.parametrize("share", [0.0, 0.1, 1.0, 10.0])
 def test_covariance_against_dense_matrices(share):
-    """The row applies to the present error less the noise since the measurement, which is correlated with it."""
+    """The row applies to the present error minus the noise since the measurement; both are correlated."""
     rng = np.random.default_rng(round(share * 10))
     m = random_memory(rng)
     m.row[:] = rng.normal(size=filter_state.SIZE)
@@ -86,7 +86,7 @@ def test_covariance_against_dense_matrices(share):
 
 
 def turning(s):
-    """The ticks of a delay, in which the force changes sides and decreases to its half."""
+    """Predict the ticks of a delay, in which the horizontal force turns and the vertical force halves."""
     for k in range(AGE):
         a = 3.0 * k / AGE
         force = (4.0 * np.cos(a), 4.0 * np.sin(a), 10.0 - 0.2 * k)
@@ -127,7 +127,7 @@ def test_attitude_noise_is_weighted_by_remaining_delay():
     assert since.attitude_position == pytest.approx(noise * left**4 / 4.0, rel=1e-3)
 
 
-def test_exact_past_measurement_leaves_noise_since():
+def test_exact_past_measurement_leaves_only_later_noise():
     m = at_rest().memory
     m.covariance[:] = np.eye(filter_state.SIZE)
     m.row[:] = 0.0

@@ -1,4 +1,4 @@
-"""Direct motor voltages from an operator instead of those of the controller."""
+"""Motor voltages set by an operator instead of the controller."""
 
 import numpy as np
 import pytest
@@ -37,7 +37,7 @@ def test_external_voltages_reproduce_controlled_flight():
     assert thrust[1] == pytest.approx(thrust[0], rel=1e-9, abs=1e-9)
 
 
-def test_direct_voltages_hold_are_limited_and_time_out(tmp_path):
+def test_direct_voltages_are_held_limited_and_time_out(tmp_path):
     script = UP | {3.0: [motors(7.0, 8.0, -1.0, 1e6), command("offboard")], 3.1: [command("hold")]}
     log = tmp_path / "direct.mcap"
     setup = resolve(load("hover", [*OPERATED, "run.duration=8"]))
@@ -45,14 +45,14 @@ def test_direct_voltages_hold_are_limited_and_time_out(tmp_path):
     with LogReader(log) as read:
         times, actuators = read.history("/drone1/actuators")
         _, truth = read.history("/drone1/ground_truth")
-        stated = read.metadata["digest"]
+        digest = read.metadata["digest"]
     direct = (times >= 3_000_000_000) & (times < 3_100_000_000)
     highest = setup.services["autopilot"].parameters.airframe.voltage_max
     assert np.array_equal(np.unique(actuators["motor_voltage"][direct], axis=0), [[7.0, 8.0, 0.0, highest]])
     assert not np.array_equal(actuators["motor_voltage"][times == 3_100_000_000][0], [7.0, 8.0, 0.0, highest])
-    assert np.ptp(truth["angular_velocity"][direct], axis=0).max() > 0.5  # it has been pushed hard
-    assert np.abs(truth["velocity"][-1]).max() < 0.1  # and rests again
-    assert resimulate(log) == (stated, stated)
+    assert np.ptp(truth["angular_velocity"][direct], axis=0).max() > 0.5  # the voltages disturbed the vehicle
+    assert np.abs(truth["velocity"][-1]).max() < 0.1  # at rest again
+    assert resimulate(log) == (digest, digest)
 
 
 def test_missing_voltages_trigger_failsafe():

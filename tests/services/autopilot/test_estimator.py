@@ -1,4 +1,4 @@
-"""The filter against closed forms and independent linear algebra; accuracy and consistency over many flights."""
+"""Filter against closed forms and independent linear algebra; accuracy and consistency over many flights."""
 
 import math
 
@@ -247,7 +247,7 @@ def rms(error):
     return np.sqrt(np.mean(error**2, axis=(0, 1)))
 
 
-def test_position_is_good_to_three_centimetres_on_rtk():
+def test_rtk_position_error_is_below_three_centimetres():
     error = ensemble().error[:, 50:, ef.P]
     assert np.all(rms(error) < (0.015, 0.015, 0.01))
     assert np.mean(np.linalg.norm(error, axis=2) < 0.03) > 0.97
@@ -266,7 +266,7 @@ def share_within_bounds(values, degrees):
 
 
 def textbook():
-    """Sensors with the modelled errors only, and a filter with their exact parameters."""
+    """Return sensors with only the modelled errors, and filter parameters that match them exactly."""
     i, m = ef.DEFAULT[0], ef.DEFAULT[1]
     exact = {"scale_error": 0.0, "misalignment_deg": 0.0}
     instruments = ef.sensor_parameters(
@@ -294,7 +294,7 @@ def textbook():
     return {"instruments": instruments, "p": p}
 
 
-def test_instruments_without_errors_give_estimate_without_errors():
+def test_ideal_instruments_cause_no_estimate_error():
     """Zero variances are accepted, and repeated readings of a vehicle at rest do not count as stuck."""
     flight = ef.flight(
         instruments=ef.sensor_parameters(**{name: ef.sensors()[name].PRESETS["ideal"] for name in ef.NAMES})
@@ -315,7 +315,7 @@ DEGREES = {
 
 
 @pytest.mark.parametrize("agility", [1.0, 2.0])
-def test_consistent_in_world_as_modelled(agility):
+def test_filter_is_consistent_with_modelled_errors(agility):
     """NEES of attitude, velocity and position, and NIS of every source, within their 95 % bounds over 100 seeds."""
     flights = ensemble(agility=agility, **textbook())
     share, mean_inside = share_within_bounds(flights.nees[:, SETTLED], 9)
@@ -324,12 +324,12 @@ def test_consistent_in_world_as_modelled(agility):
     for source, degrees in DEGREES.items():
         share, mean_inside = share_within_bounds(flights.nis[:, SETTLED, source], degrees)
         assert mean_inside, source
-        assert source == filter_state.SONAR or share > 0.9, source  # above 5 m no echo is used: the last NIS stays
+        assert source == filter_state.SONAR or share > 0.9, source  # no echo above 5 m
     assert np.mean(flights.rejected > 0) < 1e-4
 
 
 @pytest.mark.parametrize("agility", [1.0, 2.0])
-def test_consistent_on_presets(agility):
+def test_filter_is_consistent_on_presets(agility):
     """Consistency with all errors of the presets; scale and alignment are considered and not estimated."""
     flights = ensemble(agility=agility)
     _, mean_inside = share_within_bounds(flights.nees[:, SETTLED], 9)
@@ -340,7 +340,7 @@ def test_consistent_on_presets(agility):
     assert np.mean(flights.rejected > 0) < 1e-4
 
 
-def test_ordinary_receiver_leaves_truth_within_three_sigma():
+def test_standard_receiver_error_stays_within_three_sigma():
     instruments = ef.sensor_parameters(gps=ef.gps.STANDARD)
     flights = ensemble(instruments=instruments, p=estimator.PRESETS["standard"])
     error = flights.error[:, 20:, ef.P]
@@ -366,7 +366,7 @@ def test_small_innovations_of_one_sign_inflate_covariance(signs, inflates):
     assert (largest > 2.0 * P.gyro_bias_std) == inflates
 
 
-def test_rejected_reading_is_no_drift():
+def test_rejected_reading_does_not_count_as_drift():
     s = at_rest()
     s = estimator.update_gps_velocity(P, s, (30.0, 0.0, 0.0), 0.05**2, 0, True)
     assert s.memory.rejected[filter_state.GPS_VELOCITY]

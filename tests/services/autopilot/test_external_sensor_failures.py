@@ -34,13 +34,13 @@ ALL = [OFF, STUCK, GARBAGE, WRONG, SLOW, DELAYED, INTERMITTENT]
 
 
 def rejected(flight, start, source):
-    """Return the share of estimates from a time on with a rejected or missing source."""
+    """Return the share of estimates after `start` [s] with a rejected or missing source."""
     result = flight.column("estimate", lambda m: source in m.rejected_sources)[flight.times("estimate") >= start]
     return float(np.mean(result))
 
 
 def by_flow(kind):
-    """Return a flight that loses its receiver, and then the optical flow that replaces it."""
+    """Return a flight with a failure of the receiver, and then of the optical flow that replaces it."""
     script = {9: [inject("gps", OFF)], 13: [inject("optical_flow", kind, id=8)]}
     flight = fly_by_sensors(26, script, ENABLED, FLOW)
     assert results(flight)[8] == ACCEPTED

@@ -112,7 +112,7 @@ def test_position_loss_hands_over_to_manual_control():
     assert "goto: the position is lost" in sent_texts(flight)
     assert place(flight, 20.0)[0] > 2.0  # forward
     assert mode(flight, 23.0) == "descend"  # the sticks are lost
-    assert mode(flight, 26.0) == "return"  # the position is known again, but the sticks are lost
+    assert mode(flight, 26.0) == "return"  # the position has returned, but the sticks are lost
 
 
 STICKS = UP | {(5.0, 7.0): [command("manual", 0.0, 0.0, 0.0, 0.0)]}  # centred
@@ -181,7 +181,7 @@ def test_trajectory_ends_when_position_returns_without_operator():
     assert modes == ["mission", "descend", "land", "hold"]
     assert height(flight, 20.0) == pytest.approx(0.35, abs=0.05)
     assert flight.landed
-    assert at(flight, "setpoint", 6.0, lambda m: m.position.z) < 1.0  # its own setpoint, not the trajectory
+    assert at(flight, "setpoint", 6.0, lambda m: m.position.z) < 1.0  # the commander's setpoint, not the trajectory
 
 
 @pytest.mark.parametrize("seed", [1, 2, 3])

@@ -245,7 +245,7 @@ def test_gains_change_in_flight_and_act():
 def test_estimate_is_valid_after_landing_and_second_flight():
     sensors = ["imu.preset=mpu6000", "gps.preset=rtk", "magnetometer={}", "barometer={}"]
     sets = ["autopilot.estimator=kalman", *[f"sensors.{each}" for each in sensors]]
-    # seeds 3, 8, 11, 16 once rejected the receiver for 10 s: a fix before the touch-down was fused as if after it
+    # Regression: with seeds 3, 8, 11 and 16 a fix before touch-down was fused as if after it.
     for seed in (1, 2, 3, 8, 11, 16):
         again = {16: [command("takeoff", 2.0, id=5), command("arm", id=6)]}
         script = {1: UP[0.04], 7: [command("land")]} | again

@@ -47,7 +47,7 @@ def test_row_against_differences_and_sensor(axis):
 
 @kernel
 def fly(p, memory, instruments, keys, start, sees, out):
-    """The smooth flight of `estimator_flight` without a receiver from OUTAGE; ten rows per second."""
+    """Fly the path of `estimator_flight`, without a satellite receiver after OUTAGE. Write ten rows per second."""
     imu_p, mag_p, gps_p, sonar_p, flow_p = instruments
     imu_k, mag_k, gps_k, sonar_k, flow_k = keys
     truth = ef.truth_at(0.0, 1.0)
@@ -85,7 +85,7 @@ def fly(p, memory, instruments, keys, start, sees, out):
 
 
 def flights(sees):
-    """Return errors (SEEDS, n, 9), their covariance in the filter (SEEDS, n, 9, 9) and its health (SEEDS, n)."""
+    """Return errors (SEEDS, n, 9), their covariance in the filter (SEEDS, n, 9, 9) and the health flags (SEEDS, n)."""
     names = ("imu", "magnetometer", "gps", "sonar", "optical_flow")
     chosen = (imu.PRESETS["mpu6000"], next(iter(magnetometer.PRESETS.values())), gps.PRESETS["rtk"])
     instruments = (*chosen, next(iter(sonar.PRESETS.values())), optical_flow.PMW3901)
@@ -130,8 +130,8 @@ def test_flight_continues_on_optical_flow_without_gps():
 
 
 @pytest.mark.long
-def test_under_bridge_flow_carries_flight():
-    """The shipped scene, and the same with a camera without texture."""
+def test_optical_flow_bounds_position_error_under_bridge():
+    """Compare the shipped scene with the same scene after the camera fails."""
 
     def drift(flight):
         """Return the longest time without a fix [s] and the largest horizontal error of the estimate meanwhile [m]."""

@@ -19,9 +19,9 @@ def test_shipped_gain_sets_build_by_name_and_path(tmp_path):
     assert {"paper", "tuned"} <= set(names())
     for name in names():
         build(load(name), AIRFRAME)
-    own = tmp_path / "own.toml"
-    own.write_text((FOLDER / "tuned.toml").read_text(encoding="utf-8"), encoding="utf-8")
-    assert load(str(own)) == load("tuned")
+    path = tmp_path / "own.toml"
+    path.write_text((FOLDER / "tuned.toml").read_text(encoding="utf-8"), encoding="utf-8")
+    assert load(str(path)) == load("tuned")
 
 
 def test_error_is_one_line(tmp_path):

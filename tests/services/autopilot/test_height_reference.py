@@ -12,7 +12,7 @@ from lapwing.services.common.failure_types import OFF, WRONG
 from lapwing.services.scene_resolver import load
 
 SONAR = "autopilot.parameters.EKF2_HGT_REF=2"
-# the scene `groundstation`, whose plant over a slope is compiled for other tests
+# the scene `groundstation`: other tests also compile its plant over a slope
 EFFECTS = [f"effects.{name}={{}}" for name in ("air_density", "gyroscopic_torque", "battery")]
 WIND = ["effects.random_wind_force.mean=[3.0,1.0,0.0]", "effects.random_wind_force.sigma=1.0"]
 AHEAD = {0.04: [command("takeoff", 3.0), command("arm", NAN, 10.0)], 8: [command("goto", 14.0, 0.0, 3.0, 0.0, 2.0)]}

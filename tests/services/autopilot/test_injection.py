@@ -52,7 +52,7 @@ LOOKING = ["sensors.optical_flow.preset=pmw3901", "sensors.airspeed.preset=sdp33
 
 
 def rejected(flight, start, source):
-    """Return the share of estimates from a time on with a rejected or missing source."""
+    """Return the share of estimates after `start` [s] with a rejected or missing source."""
     result = flight.column("estimate", lambda m: source in m.rejected_sources)[flight.times("estimate") >= start]
     return float(np.mean(result))
 
@@ -110,7 +110,7 @@ VALID = {"gps": 11}
 @pytest.mark.parametrize("kind", [OFF, STUCK, GARBAGE, WRONG, SLOW, DELAYED, INTERMITTENT], ids=KINDS[1:])
 def test_received_reading_follows_failure_type(kind):
     for name, late, first, sent, actual in received(kind):
-        assert np.array_equal(sent[: first - 1], actual[: first - 1])  # valid before
+        assert np.array_equal(sent[: first - 1], actual[: first - 1])  # valid before the failure
         there, numbers = actual[first:, VALID.get(name, -1)] > 0.0, slice(0, VALUES[name])
         sent_then, got_then = sent[first:, numbers], actual[first:, numbers]
         if kind == OFF:
@@ -151,7 +151,7 @@ def test_motor_off_failure_is_detected():
 
 
 def voltages(flight, start):
-    """Return the motor voltages [V] from a time on."""
+    """Return the motor voltages [V] after `start` [s]."""
     return flight.column("actuators", lambda m: tuple(m.motor_voltage))[flight.times("actuators") > start]
 
 
@@ -169,7 +169,7 @@ def test_weak_motor_is_detected_and_vehicle_lands_upright():
     assert "a motor has failed: land" in sent_texts(flight)
     assert at(flight, "status", 6.5, lambda m: m.failed_motor) == 3
     sound = flight.column("actuators", lambda m: tuple(m.motor_voltage))[flight.times("actuators") < 5.9][-1]
-    assert voltages(flight, 6.02)[0, 2] < 0.9 * sound[2]  # its voltage; the controller commands more
+    assert voltages(flight, 6.02)[0, 2] < 0.9 * sound[2]  # the voltage at the weak motor; the controller commands more
     assert height(flight, 7.0) > 2.0
     assert math.dist(place(flight, 16.0)[:2], (0.0, 0.0)) < 0.5
     assert not at(flight, "status", 16.0, lambda m: m.armed)
@@ -276,7 +276,7 @@ def test_failed_sensor_is_rejected_and_flight_continues(unit, kind):
     flight = fly_by_sensors(13, {9: [inject(unit, kind)]}, ENABLED)
     assert results(flight)[7] == ACCEPTED
     assert rejected(flight, 10.0, {"distance_sensor": "sonar"}.get(unit, unit)) > 0.5
-    assert error(flight, 9.0) < (3.0 if (unit, kind) == ("gps", GARBAGE) else 1.0)  # one of many may pass the gate
+    assert error(flight, 9.0) < (3.0 if (unit, kind) == ("gps", GARBAGE) else 1.0)  # a few may pass the gate
     assert math.dist(place(flight, 13.0)[:2], place(flight, 9.0)[:2]) < 1.5
 
 

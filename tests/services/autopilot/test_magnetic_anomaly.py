@@ -1,4 +1,4 @@
-"""Declination: the autopilot has the World Magnetic Model at home, without local anomalies."""
+"""Declination: the autopilot uses the World Magnetic Model at home and does not know local anomalies."""
 
 import math
 import subprocess
@@ -16,10 +16,10 @@ ANOMALY = "environment.magnetic_anomaly=[2e-6,-1e-6,3e-6]"
 
 def test_magnetic_anomaly_affects_sensors_only():
     services = resolve(load("quad_x", [ANOMALY])).services
-    felt = services["sensors"].parameters.instruments[0].around.magnetic_field_world
+    measured = services["sensors"].parameters.instruments[0].around.magnetic_field_world
     model_field = services["autopilot"].parameters.estimator.magnetic_field_world
     assert model_field == STANDARD.magnetic_field_world
-    assert np.subtract(felt, model_field) == pytest.approx((2e-6, -1e-6, 3e-6))
+    assert np.subtract(measured, model_field) == pytest.approx((2e-6, -1e-6, 3e-6))
 
 
 def yaw(q):
@@ -29,9 +29,9 @@ def yaw(q):
 
 @pytest.mark.long
 @pytest.mark.parametrize("values", [[], [ANOMALY]])
-def test_command_flies_with_heading_wrong_by_unknown_declination(tmp_path, values):
-    """The heading error is the angle of the model's horizontal field less that of the local field."""
-    ideal = [f"sensors.{name}.preset=ideal" for name in ("imu", "magnetometer")]  # a tilt would turn the field, too
+def test_unknown_declination_offsets_estimated_heading(tmp_path, values):
+    """The heading error is the direction of the model's horizontal field minus that of the local field."""
+    ideal = [f"sensors.{name}.preset=ideal" for name in ("imu", "magnetometer")]  # a tilt would rotate the field
     sets = [*values, *ideal, "run.duration=1.0", "success.require=[]"]
     command = [sys.executable, "-m", "lapwing", "run", "quad_x", "--mode", "single-process"]
     command += ["--log", str(tmp_path / "a.mcap"), *(part for text in sets for part in ("--set", text))]

@@ -29,7 +29,7 @@ def test_pid_on_double_integrator_has_minimum_gain():
 
 
 @pytest.mark.parametrize(("gain", "crossover"), [(1e9, math.inf), (1e-9, 0.0)])
-def test_gain_never_one_has_no_crossover(gain, crossover):
+def test_loop_without_unity_gain_has_no_crossover(gain, crossover):
     s = 1j * FREQUENCIES
     assert margins(gain / s)[:2] == (crossover, math.inf)
 

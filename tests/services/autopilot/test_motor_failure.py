@@ -1,4 +1,4 @@
-"""Motor failure detector against a body integrated here: signs, fractions of thrust, detection time."""
+"""Motor failure detector on a body integrated in this test: signs, fractions of thrust, detection time."""
 
 import numpy as np
 import pytest
@@ -61,7 +61,7 @@ def test_push_along_axis_is_no_motor_failure():
     assert campaign_setup(np.ones(4), push=(0.0, -6.0)).failed == 0
 
 
-def test_on_ground_feet_may_push():
+def test_push_of_feet_on_ground_is_no_motor_failure():
     assert campaign_setup(np.array([1.0, 1.0, 0.0, 1.0]), height=0.1).failed == 0
 
 

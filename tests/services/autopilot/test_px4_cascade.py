@@ -88,7 +88,7 @@ def test_attitude_setpoint_has_thrust_axis_and_yaw(tilt, yaw):
     assert across == pytest.approx(0.0, abs=1e-9)  # body x is in the vertical plane of the heading
 
 
-def test_small_attitude_errors_give_gain_times_angle():
+def test_rate_setpoint_is_gain_times_small_attitude_error():
     now = from_roll_pitch_yaw(0.1, -0.2, 0.7)
     for axis in range(3):
         turn = [0.0, 0.0, 0.0]

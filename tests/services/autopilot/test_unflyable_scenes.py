@@ -37,14 +37,14 @@ def test_hover_limit_equals_performance_card():
         load("hover", {**scene, "vehicle.mass": 1.001 * heaviest})
 
 
-def test_slung_load_that_rotors_cannot_lift():
+def test_slung_load_too_heavy_for_rotors_is_rejected():
     with pytest.raises(SceneError, match=r"slung_load.mass: expected a lighter load .*got 20: the rotors lift at most"):
         load("slung_load", {"slung_load.mass": 20.0})
 
 
-def test_field_without_heading():
+def test_vertical_magnetic_field_is_rejected_on_sensors():
     with pytest.raises(
         SceneError, match=r"environment.magnetic_field: expected at least 1e-06 T, got 0 T horizontally"
     ):
         load("hover", {**SENSORS, "environment.magnetic_field": [0.0, 0.0, -4e-5]})
-    load("hover", {"environment.magnetic_field": [0.0, 0.0, -4e-5]})  # on the ground truth
+    load("hover", {"environment.magnetic_field": [0.0, 0.0, -4e-5]})  # accepted: this flight uses the ground truth

@@ -1,4 +1,4 @@
-"""A scripted Betaflight SITL: answers each state packet with motor outputs, and MSP status requests.
+"""Scripted Betaflight SITL: answers each state packet with motor outputs, and MSP status requests.
 
 Written from the interface description and checked against the traffic of the real firmware: one motor packet for each
 state packet, outputs 0 while disarmed, 0.055 when armed at low throttle.
@@ -17,16 +17,18 @@ REQUEST = b"$M<\x00\x96\x96"
 def free_ports():
     """Return the first of four consecutive free ports."""
     for first in range(21_000, 60_000, 40):
-        held = []
+        sockets = []
         try:
             for port, kind in zip(range(first, first + 4), ["udp", "udp", "udp", "tcp"], strict=True):
-                held.append(socket.socket(socket.AF_INET, socket.SOCK_STREAM if kind == "tcp" else socket.SOCK_DGRAM))
-                held[-1].bind(("127.0.0.1", port))
+                sockets.append(
+                    socket.socket(socket.AF_INET, socket.SOCK_STREAM if kind == "tcp" else socket.SOCK_DGRAM)
+                )
+                sockets[-1].bind(("127.0.0.1", port))
             return first
         except OSError:
             continue
         finally:
-            for each in held:
+            for each in sockets:
                 each.close()
     raise AssertionError("no free ports")
 
@@ -48,11 +50,11 @@ class Peer:
     Attributes:
         states: unpacked state packets.
         channels: newest RC channels.
-        early: True if RC channels came before a request for the status, which makes the firmware deaf to RC.
+        early: True if RC channels came before a request for the status, after which the firmware ignores RC.
     """
 
     def __init__(self, first, answer=None, blockers=0):
-        """Listen from port `first` + 1; `answer(n, own)` replaces the peer's motor packet by a list of packets."""
+        """Listen from port `first` + 1; `answer(n, reply)` returns the packets to send instead of the motor packet."""
         self._first, self._answer, self._blockers = first, answer, blockers
         self.states, self.channels, self.early = [], (1000,) * 16, False
         self._asked = False
@@ -107,8 +109,8 @@ class Peer:
                     self.early = self.early or not self._asked
                 elif each is self._state:
                     self.states.append(STATE.unpack(self._state.recv(4096)))
-                    own = MOTORS.pack(*self.outputs())
-                    for packet in self._answer(len(self.states), own) if self._answer else [own]:
+                    reply = MOTORS.pack(*self.outputs())
+                    for packet in self._answer(len(self.states), reply) if self._answer else [reply]:
                         self.send(packet)
                 else:
                     self._msp(each)

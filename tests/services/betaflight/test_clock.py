@@ -12,7 +12,7 @@ BEGIN = 1.0  # [s] time of the earlier packets
 
 
 class Firmware:
-    """Clock of Betaflight SITL (sitl.c): its rate is the time between two packets over that between their arrivals."""
+    """Clock of Betaflight SITL (sitl.c): rate = time between two packets / time between their arrivals."""
 
     def __init__(self, late=(), latency=0.03, answers=True):
         """Create the clock; `late`: delays [s] of the arrival of packets with a new time, by number."""

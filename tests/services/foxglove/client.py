@@ -7,7 +7,7 @@ import socket
 from contextlib import suppress
 
 CLOSE, PONG = 8, 10  # kinds of frames
-PATIENCE = 0.05  # [s] for a pong; a server that waits for the rest of a frame sends none
+PATIENCE = 0.05  # [s] wait for a pong; a server that waits for the rest of a frame does not send one
 
 
 class Client:

@@ -1,4 +1,4 @@
-"""Data of a Foxglove WebSocket client: topics, unchanged payloads, time."""
+"""Foxglove WebSocket server: topics, unchanged payloads, time, access."""
 
 import re
 import signal
@@ -147,8 +147,8 @@ def test_invalid_foxglove_address_is_rejected(text):
 
 
 def test_used_address_is_reported():
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        port = taken.getsockname()[1]
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        port = server.getsockname()[1]
         with pytest.raises(ValueError, match=f"--foxglove 127.0.0.1:{port}: cannot be listened on"):
             Server(f"127.0.0.1:{port}")
 

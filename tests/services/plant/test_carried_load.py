@@ -47,13 +47,13 @@ initial_position = [0.0, -1.0]
 """
 
 
-def two(tmp_path, *overrides):
+def two_carriers(tmp_path, *overrides):
     return parse(tmp_path / "two.toml", COMMON.format(load=SHARED, vehicles=TWO), overrides)
 
 
 @pytest.fixture(scope="module")
 def setup(tmp_path_factory):
-    return resolve(two(tmp_path_factory.mktemp("scene"), "trajectory.phase.0.x.to=0.0"))
+    return resolve(two_carriers(tmp_path_factory.mktemp("scene"), "trajectory.phase.0.x.to=0.0"))
 
 
 @pytest.fixture(scope="module")
@@ -98,14 +98,14 @@ def test_static_cables_carry_weight(recorded_flight):
     down = (hooks[0][2] - place[2]) / lengths[0]
     stretch = 0.5 * 2.0 * 9.80665 / down / 2000.0  # of each cable, by Hooke's law
     assert lengths == pytest.approx([2.0 + stretch] * 2, abs=5e-4)
-    # mirrored about the plane between the two
+    # symmetric about the plane between the carriers
     assert left.position[-1] * (1, -1, 1) == pytest.approx(right.position[-1], abs=1e-6)
-    assert left.position[-1, 1] < 0.999  # pulled inwards
+    assert left.position[-1, 1] < 0.999  # the cable pulls the carrier inwards
 
 
 def test_strictest_accuracy_keeps_load_substeps_above_round_off(tmp_path):
-    """Round-off rejects every substep at the tolerance of the vehicles, and a communication step never ends."""
-    setup = resolve(two(tmp_path, "solver.accuracy=1e-12", "solver.step=0.001"))
+    """At the tolerance of the vehicles round-off would reject every substep: a communication step would not end."""
+    setup = resolve(two_carriers(tmp_path, "solver.accuracy=1e-12", "solver.step=0.001"))
     plants = [config.parameters for config in setup.services["plant"].parameters.given]
     assert [plant.core.vehicle.tolerance for plant in plants] == [1e-15, 1e-15]
     assert [plant.others.load.tolerance for plant in plants if plant.others.load] == [LEAST_TOLERANCE]
@@ -142,7 +142,7 @@ def test_configuration_survives_json(setup):
 )
 def test_invalid_shared_load_is_rejected(tmp_path, override, message):
     with pytest.raises(SceneError, match=message):
-        resolve(two(tmp_path, override))
+        resolve(two_carriers(tmp_path, override))
 
 
 @pytest.mark.long

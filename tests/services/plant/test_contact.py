@@ -43,7 +43,7 @@ def force_residual(flight):
 @pytest.mark.long
 @pytest.mark.parametrize("friction", ["stick_slip", "regularised"])
 def test_forces_sum_to_mass_times_acceleration(friction):
-    """Including the bounces of the landing, with forces above the weight."""
+    """The flight includes bounces at the landing, with forces above the weight."""
     flight = lapwing.fly("hover", {**ASKED, "effects.ground_contact.friction": friction})
     force = flight.topic("contact_forces").force
     assert abs(force_residual(flight)).max() < 1e-6

@@ -61,7 +61,7 @@ def recorded_flight(setup):
 @pytest.mark.long
 def test_downwash_acts_only_below(recorded_flight):
     above, below = (recorded_flight.view(f"{name}/ground_truth").wind for name in ("above", "below"))
-    assert -0.2 < above[-1, 2] < 0.0  # the other vehicle's inflow
+    assert -0.2 < above[-1, 2] < 0.0  # inflow of the other vehicle
     assert below[-1, 2] < -2.0
     assert np.abs(below[:200]).max() < 0.05  # 3 m to the side
     height = recorded_flight.view("below/ground_truth").position[:, 2]

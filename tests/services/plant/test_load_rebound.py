@@ -1,4 +1,4 @@
-"""Shared load whose cable tightens, or which lands, within a step, against the closed form."""
+"""Shared load whose cable tightens within a step, or that lands within a step, against the closed form."""
 
 import pytest
 

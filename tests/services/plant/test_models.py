@@ -68,7 +68,7 @@ def formation_steps(scene, count):
     return list(zip(flight.messages("body_states"), flight.messages("rotor_wrench"), strict=True))
 
 
-def three(path):
+def formation_of_three(path):
     """Return the formation with a third quadrotor."""
     text = LOAD.read_text()
     text = text.replace("[0.755, 0.755]", "[0.755, 0.755, 0.6]").replace("[0.6, 0.8]", "[0.6, 0.8, 0.7]")
@@ -83,7 +83,7 @@ def three(path):
 
 @pytest.mark.parametrize("number", [2, 3])
 def test_links_keep_their_lengths_and_load_its_path(number, tmp_path):
-    scene = load(LOAD) if number == 2 else three(tmp_path / "three.toml")
+    scene = load(LOAD) if number == 2 else formation_of_three(tmp_path / "three.toml")
     flight = formation_steps(scene, 2001)
     lengths = scene.lookup("cooperative_load.link_length")
     for bodies, _ in flight[::50]:

@@ -1,4 +1,4 @@
-"""`vehicle.model = "multibody"`: its scene tables, and a climb that equals that of the rigid-body model."""
+"""Plant model `multibody`: scene tables, propeller failures, and the climb of the rigid-body model."""
 
 import math
 import re

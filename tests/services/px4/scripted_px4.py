@@ -1,6 +1,6 @@
-"""Replacement of PX4 in complete runs: accepts a mission, arms, climbs to 2 m, descends and disarms.
+"""Scripted replacement of PX4 for complete runs: accepts a mission, arms, climbs to 2 m, descends and disarms.
 
-It is started as `python scripted_px4.py -i INSTANCE`. With `--stall` it stops to answer in the air; with `--starts
+Started as `python scripted_px4.py -i INSTANCE`. With `--stall` it stops answering in flight; with `--starts
 FILE` it appends its instance and process id to a file.
 """
 

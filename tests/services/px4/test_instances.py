@@ -89,7 +89,7 @@ def test_campaign_starts_and_ends_one_program_for_each_run(program, tmp_path):
 def test_concurrent_run_uses_next_instance(program, tmp_path):
     command, file = program
     with ExitStack() as stack:
-        for instance in range(2):  # simulates two other runs
+        for instance in range(2):  # occupied as by two other runs
             s = stack.enter_context(socket.socket())
             s.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
             try:

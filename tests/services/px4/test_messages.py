@@ -43,7 +43,7 @@ def test_rates_turn_right_and_nose_up_in_frd():
 
 
 def test_field_of_nose_to_north_points_forward_and_down():
-    """Naples: about 0.24 gauss to the north, 0.39 gauss down; the nose to the north makes FLU (n, w, up)."""
+    """Naples: about 0.24 gauss to the north, 0.39 gauss down; with the nose to the north FLU is (north, west, up)."""
     east, north, up = STANDARD.magnetic_field_world
     result = sensor(field_body=(north, -east, up))
     assert result.xmag == pytest.approx(1e4 * north)

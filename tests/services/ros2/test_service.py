@@ -1,4 +1,4 @@
-"""A run as a node of a ROS 2 graph, observed and commanded by zenoh-ros2-sdk, an independent client."""
+"""Run as a node of a ROS 2 graph, observed and commanded by zenoh-ros2-sdk, an independent client."""
 
 import os
 import queue
@@ -28,8 +28,8 @@ PATIENCE = 120.0  # [s] for the run to compile and start
 
 @pytest.fixture
 def port():
-    with socket.create_server(("127.0.0.1", 0)) as taken:
-        return taken.getsockname()[1]
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return server.getsockname()[1]
 
 
 @pytest.fixture
@@ -133,7 +133,7 @@ def test_ros_nodes_observe_and_command_run(tmp_path, port, graph):
         while received[-1].header.stamp.sec < 13:
             received.append(poses.get(timeout=PATIENCE))
             if received[-1].header.stamp.sec >= 6:  # the estimator has settled
-                if poses.empty():  # not for every queued message
+                if poses.empty():  # one command at a time, not one for every queued message
                     target.publish(header=received[-1].header, pose=there)
                 if not started and received[-1].header.stamp.nanosec > 500_000_000:
                     started = True
@@ -235,7 +235,7 @@ def test_ros_nodes_observe_distributed_run(tmp_path, port, graph):
     common = ["groundstation", *sets, "--set", "success.require=[]", "--endpoints", table, "--key-prefix", "elsewhere"]
     log = ["--log", str(tmp_path / "a.mcap")]
     graph_at = ["--ros2", str(DOMAIN), "--ros2-router", f"127.0.0.1:{port}"]
-    own = {"plant": ["--speed", "1"], "recorder": log, ROS2: graph_at}
+    options = {"plant": ["--speed", "1"], "recorder": log, ROS2: graph_at}
     lapwing, pipe = [sys.executable, "-m", "lapwing"], subprocess.PIPE
     started = []
 
@@ -245,10 +245,10 @@ def test_ros_nodes_observe_distributed_run(tmp_path, port, graph):
         return started[-1]
 
     try:
-        node = start("service", ROS2, *own[ROS2])
+        node = start("service", ROS2, *options[ROS2])
         await_listener(node, port)
         for name in names[:-1]:
-            start("service", name, *own.get(name, []))
+            start("service", name, *options.get(name, []))
         run = start("run", *log)
         clock, events = graph.subscribe("/clock", Clock), graph.subscribe("/drone1/events", Log)
         arm, requested = graph.publisher("/drone1/command/arm", Bool), False

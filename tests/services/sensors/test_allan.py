@@ -18,14 +18,14 @@ GPSS = {name: p for name, p in gps.PRESETS.items() if name != "ideal"}
 
 
 def at_peak(sensor, p, correlation_time, samples=1_000_000):
-    """Return the Allan deviation at the peak of that of the bias walk."""
+    """Return the Allan deviation at the cluster time at which that of the bias walk has its peak."""
     m = 40
     p = p._replace(rate=m / (error_models.ALLAN_PEAK_TIME * correlation_time))
     return allan_deviation(record(sensor, p, samples), m)
 
 
 @pytest.mark.parametrize("name", IMUS)
-def test_imu_white_noise(name):
+def test_imu_white_noise_is_stated_density(name):
     """At the preset's rate and resolution: n / sqrt(2 tau) for a one-sided density n."""
     p = IMUS[name]._replace(warm_up_rise=0.0)
     m = 25
@@ -45,7 +45,7 @@ def test_stated_random_walk_of_mpu6000():
 
 
 @pytest.mark.parametrize("name", IMUS)
-def test_imu_bias_instability(name):
+def test_imu_bias_instability_is_stated_value(name):
     p = IMUS[name]
     p = p._replace(
         warm_up_rise=0.0,
@@ -64,7 +64,7 @@ def white(sensor, p, density, columns):
 
 
 @pytest.mark.parametrize("name", ["rm3100", "hmc5883l"])
-def test_magnetometer(name):
+def test_magnetometer_noise_is_that_of_preset(name):
     p = MAGNETOMETERS[name]
     fine = p._replace(resolution_nt=0.0)
     assert white("magnetometer", fine, p.noise_nt_per_sqrt_hz * 1e-9, slice(3)) == pytest.approx(1.0, rel=0.05)
@@ -74,7 +74,7 @@ def test_magnetometer(name):
     )
 
 
-def test_barometer():
+def test_barometer_noise_is_that_of_preset():
     p = BAROMETERS["ms5611"]
     fine = p._replace(resolution_pa=0.0)
     assert white("barometer", fine, p.noise_pa_per_sqrt_hz, slice(1)) == pytest.approx(1.0, rel=0.05)
@@ -84,14 +84,14 @@ def test_barometer():
     assert 1.0 <= p.noise_pa_per_sqrt_hz * math.sqrt(p.rate / 2) <= 3.0  # [Pa] in samples at 20 to 50 Hz
 
 
-def test_sonar():
+def test_sonar_noise_is_that_of_preset():
     p = SONARS["mb1202"]._replace(resolution=0.0)
     assert white("sonar", p, p.noise_m_per_sqrt_hz, slice(1)) == pytest.approx(1.0, rel=0.05)
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", GPSS)
-def test_gps(name):
+def test_gps_noise_is_that_of_preset(name):
     p = GPSS[name]
     still = p._replace(correlated_error_horizontal=0.0, correlated_error_vertical=0.0)
     assert white("gps", still, p.noise_horizontal_m_per_sqrt_hz, slice(2)) == pytest.approx(1.0, rel=0.05)
@@ -105,7 +105,7 @@ def test_gps(name):
 
 
 @pytest.mark.parametrize("rate", [50.0, 200.0, 1000.0])
-def test_same_physical_noise_at_any_rate(rate):
+def test_noise_density_is_independent_of_rate(rate):
     p = imu.BMI088
     p = p._replace(rate=rate, warm_up_rise=0.0, gyro=p.gyro._replace(resolution_dps=0.0))
     tau = 0.1
@@ -114,11 +114,11 @@ def test_same_physical_noise_at_any_rate(rate):
 
 
 @pytest.mark.parametrize("rate", [0.05, 0.2])
-def test_same_bias_walk_at_any_rate(rate):
+def test_bias_walk_is_independent_of_rate(rate):
     p = imu.Imu(gyro=imu.Gyro(bias_instability_deg_per_h=4.6, bias_correlation_time=100.0), rate=rate)
     m = round(error_models.ALLAN_PEAK_TIME * 100.0 * rate)
     deviation = rms_of_axes(allan_deviation(record("imu", p, 300_000), m)[:3])
-    # With nine or more samples a cluster their mean is the cluster's within 1 %.
+    # With nine or more samples per cluster their mean is the mean of the cluster within 1 %.
     assert deviation == pytest.approx(4.6 * DPS / 3600.0, rel=0.05)
 
 

@@ -106,7 +106,7 @@ def test_custom_sensors_have_separate_topics(scene, tmp_path):
     assert (logs[1].topic("custom_sensor/height")["values"] == height["values"]).all()
 
 
-def test_preset_and_its_noise(scene):
+def test_preset_of_custom_sensor_sets_its_noise(scene):
     noisy = fly(scene("sensors.anemometer.preset=noisy")).topic("custom_sensor/anemometer")["values"][:, 0]
     ideal = fly(scene()).topic("custom_sensor/anemometer")["values"][:, 0]
     assert np.std(noisy - ideal) == pytest.approx(0.1, rel=0.3)

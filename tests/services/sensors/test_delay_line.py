@@ -1,4 +1,4 @@
-"""Each fault alone on an ideal magnetometer in a growing field, and invalid schedules."""
+"""Sensor faults, one at a time, on an ideal magnetometer in a growing field; invalid schedules."""
 
 import numpy as np
 import pytest
@@ -40,32 +40,32 @@ TRUE = np.arange(30.0)
 ON = (TRUE >= 10) & (TRUE < 20)
 
 
-def test_dropout_is_invalid_message():
+def test_dropout_makes_reading_invalid():
     assert [r.valid for r in fly({"kind": "dropout"})] == [not on for on in ON]
 
 
-def test_freeze():
+def test_freeze_repeats_last_reading():
     np.testing.assert_array_equal(fields({"kind": "freeze"}), np.where(ON, 9.0, TRUE))
 
 
-def test_bias():
+def test_bias_adds_constant():
     np.testing.assert_array_equal(fields({"kind": "bias", "size": [3.0, 0.0, 0.0]}), np.where(ON, TRUE + 3, TRUE))
 
 
-def test_drift_is_per_second():
+def test_drift_grows_by_its_size_per_second():
     expected = np.where(ON, TRUE + 5.0 * (TRUE - 10) * TICK, TRUE)
     np.testing.assert_allclose(fields({"kind": "drift", "size": 5.0}), expected, atol=1e-12)
 
 
-def test_wrong_scale():
+def test_scale_multiplies_reading():
     np.testing.assert_array_equal(fields({"kind": "scale", "size": 2.0}), np.where(ON, 2 * TRUE, TRUE))
 
 
-def test_delay():
+def test_delay_returns_earlier_reading():
     np.testing.assert_array_equal(fields({"kind": "delay", "samples": 4}), np.where(ON, TRUE - 4, TRUE))
 
 
-def test_spikes_come_at_stated_rate():
+def test_spikes_have_stated_probability_and_size():
     error = np.array(
         [r.field_body[0] for r in fly({"kind": "spikes", "size": 50.0, "probability": 0.3, "stop": 1e9}, ticks=2000)]
     )
@@ -101,7 +101,7 @@ def test_invalid_schedule_error_is_one_line(table, words):
     assert "\n" not in str(error.value)
 
 
-def test_too_many_faults():
+def test_more_than_four_faults_are_rejected():
     with pytest.raises(ValueError, match="at most 4"):
         compile_faults([{"kind": "freeze"}] * 5, magnetometer.CHANNELS, TICK)
 

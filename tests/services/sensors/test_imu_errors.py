@@ -1,4 +1,4 @@
-"""IMU errors by cross-coupling, internal filter, sampling and rotors, against closed forms."""
+"""IMU errors due to cross-coupling, internal filter, sampling and rotors, against closed forms."""
 
 import math
 import subprocess
@@ -85,7 +85,7 @@ def test_filter_delays_slow_motion_by_its_group_delay():
 
 
 @pytest.mark.long
-def test_matrix_and_response_to_g():
+def test_cross_coupling_matrix_and_g_sensitivity_of_gyro():
     rows = (1.01, 0.002, 0.0, -0.003, 1.0, 0.0, 0.0, 0.004, 0.99)
     p = imu.Imu(cross_coupling=CrossCoupling(gyro_matrix=rows))
     result = readings(p, spin=np.full(4, 2.0), samples=4)[3, :3]
@@ -108,7 +108,7 @@ def test_skewed_axes_are_symmetric():
     assert np.abs(m - np.eye(3)).max() > 1e-3
 
 
-def test_axis_stays_at_limit_until_recovered():
+def test_saturated_axis_stays_at_limit_for_recovery_time():
     p = imu.Imu(accelerometer=imu.Accelerometer(range_g=2.0), rate=100.0, saturation_recovery=0.05)
     push = np.zeros(30)
     push[10:12] = -50.0
@@ -125,7 +125,7 @@ def test_jitter_is_noise_in_proportion_to_slope():
 
 
 @pytest.mark.long
-def test_imbalance_aliases_and_filter_weakens_it():
+def test_rotor_imbalance_aliases_and_filter_attenuates():
     """500 rad/s is 79.6 Hz; blade passage at 159.2 Hz appears at 250 - 159.2 Hz."""
     v = RotorVibration(rotor_speed=500.0, damage_mg=100.0, blade_pass_mg=50.0, damage=Damage(0, 0, 1.0))
     p, n = imu.Imu(rate=250.0, rotor_vibration=v), 8000
@@ -139,7 +139,7 @@ def test_imbalance_aliases_and_filter_weakens_it():
 
 
 @pytest.mark.long
-def test_vibration_is_rectified():
+def test_vibration_causes_rectification_bias():
     v = RotorVibration(rotor_speed=250.0, damage_mg=100.0, damage=Damage(0, 0, 1.0))
     c = CrossCoupling(rectification_mg_per_g2=20.0, gyro_rectification_dps_per_g2=0.5)
     result = readings(imu.Imu(rotor_vibration=v, cross_coupling=c), TURNING, samples=8000).mean(axis=0)

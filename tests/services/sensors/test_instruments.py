@@ -83,7 +83,7 @@ def test_imu_scale_and_misalignment_have_stated_size():
     np.testing.assert_allclose(spread, (0.01, math.radians(0.5), math.radians(0.5)), rtol=0.15)
 
 
-def test_imu_warms_up():
+def test_imu_bias_decays_during_warm_up():
     """The bias at the start decays with the time constant of the warm-up."""
     p = imu.Imu(imu.Gyro(temperature_dps_per_k=1.0), warm_up_rise=10.0, warm_up_time=1.0, rate=100.0)
     first = np.array(read(imu, p, truth()).omega_body)
@@ -122,7 +122,7 @@ def test_gps_position_is_delayed_by_latency():
     assert reading.age == pytest.approx(0.2)
 
 
-def test_gps_states_its_own_variance():
+def test_gps_reports_its_position_variance():
     for p in (gps.RTK, gps.STANDARD):
         reading = read(gps, p, truth())
         east, _, up = reading.position_variance
@@ -152,7 +152,7 @@ SONAR = sonar.Sonar(range_min=0.2, range_max=7.65, resolution=0.01, half_beam_de
         (1.2345, 0.0, 1.23),
     ],
 )
-def test_sonar_range(height, tilt_deg, expected):
+def test_sonar_range_by_height_and_tilt(height, tilt_deg, expected):
     reading = read(sonar, SONAR, truth(attitude=from_roll_pitch_yaw(math.radians(tilt_deg), 0.0, 0.4), height=height))
     assert reading.range == np.float32(expected)
     assert reading.valid
@@ -160,7 +160,7 @@ def test_sonar_range(height, tilt_deg, expected):
 
 @pytest.mark.long
 @pytest.mark.parametrize(("slope_deg", "tilt_deg"), [(20.0, 0.0), (20.0, 20.0), (20.0, -4.0), (8.0, 0.0), (20.0, -6.0)])
-def test_sonar_over_slope(slope_deg, tilt_deg):
+def test_sonar_reads_nearest_ground_of_slope(slope_deg, tilt_deg):
     """The nearest ground within the beam: across the slope 2 m cos(slope), at slope - tilt from the beam's axis."""
     slope, tilt = math.radians(slope_deg), math.radians(tilt_deg)
     ground = relief(slope=(0.0, math.tan(slope)))
@@ -214,7 +214,7 @@ def test_gps_has_no_fix_under_roof():
     assert [read(gps, p, truth((*place, 2.0))).valid for place in places] == [True, False, True, False, False, True]
 
 
-def test_magnetometer_near_leads_of_motors():
+def test_motor_current_adds_magnetic_field():
     """10 A at 30 nT/A along y."""
     near = truth()._replace(motor_current=10.0)
     leads = magnetometer.Magnetometer(current_nt_per_a=(0.0, 30.0, 0.0))
@@ -385,7 +385,7 @@ def test_delta_angles_of_coning_restore_attitude():
 
 @pytest.mark.long
 def test_integrated_readings_restore_velocity_at_imu():
-    """The sum of R_before f / rate - g t is the change of v + R (omega x r), with rotation and acceleration."""
+    """The sum of R_before f / rate - g t is the change of v + R (omega x r), of a turning, accelerating body."""
     rate, place = 100.0, (0.2, -0.1, 0.05)
     p, gained, before, path = imu.Imu(rate=rate, delta_output=True, position=place), np.zeros(3), None, []
     for k in range(60):
@@ -425,7 +425,7 @@ def test_rotor_vibration_is_aliased_and_integration_attenuates():
     assert left == pytest.approx(amplitude * abs(math.sin(x) / x), rel=1e-6)
 
 
-def test_barometer_in_wash_of_rotors():
+def test_rotor_thrust_changes_barometer_pressure():
     flying = truth()._replace(thrust=98.0)
     still = read(barometer, barometer.Barometer(), flying).pressure
     assert read(barometer, barometer.Barometer(wash_pa_per_n=-0.2), flying).pressure - still == pytest.approx(-19.6)

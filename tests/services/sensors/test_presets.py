@@ -41,7 +41,7 @@ DENSITIES = {  # one-sided densities of the channels, and replacements for readi
 PARTS = [(name, part) for name in DENSITIES for part in registry.sensors()[name].PRESETS if part != "ideal"]
 
 
-def test_each_sensor_has_two_real_parts():
+def test_each_sensor_has_presets_of_two_parts():
     for name in DENSITIES:
         assert len([part for sensor, part in PARTS if sensor == name]) >= 2, name
 
@@ -59,35 +59,35 @@ def deviation(density, p):
     return density * math.sqrt(0.5 * p.rate)
 
 
-def test_barometer_of_data_sheet():
+def test_barometer_preset_matches_data_sheet():
     p = BAROMETERS["dps422"]
     assert deviation(p.noise_pa_per_sqrt_hz, p._replace(rate=10.0)) == pytest.approx(0.5, rel=0.05)
     assert 2.0 * p.turn_on_bias_pa == 100.0
     assert 2.0 * p.temperature_pa_per_k <= 0.5
 
 
-def test_sonar_of_data_sheet():
+def test_sonar_preset_matches_data_sheet():
     p = SONARS["hc_sr04"]
     assert 2.0 * deviation(p.noise_m_per_sqrt_hz, p) == pytest.approx(3e-3, rel=0.05)
     assert (p.range_min, p.range_max, 2.0 * p.half_beam_deg) == (0.02, 4.0, 15.0)
 
 
 @pytest.mark.parametrize(("distance", "accuracy"), [(6.0, 0.04), (12.0, 0.06)])
-def test_rangefinder_of_data_sheet(distance, accuracy):
+def test_rangefinder_preset_matches_data_sheet(distance, accuracy):
     p = RANGEFINDERS["tfmini"]
     noise = deviation(p.noise_m_per_sqrt_hz, p)
     assert 2.0 * math.hypot(noise, p.scale_error * distance) == pytest.approx(accuracy, rel=0.1)
     assert (p.range_min, p.range_max, p.resolution, p.beam_deg) == (0.3, 12.0, 0.005, 2.3)
 
 
-def test_airspeed_sensor_of_data_sheet():
+def test_airspeed_preset_matches_data_sheet():
     p = AIRSPEEDS["ms4525do"]
     assert p.range_pa == pytest.approx(PSI)
     assert p.resolution_pa == pytest.approx(2.0 * PSI / (0.8 * 16384), rel=1e-3)
     assert 2.0 * p.turn_on_bias_pa == pytest.approx(0.01 * 2.0 * PSI, rel=0.01)
 
 
-def test_flow_camera_of_data_sheet():
+def test_flow_camera_preset_matches_data_sheet():
     p = FLOWS["paw3902"]
     assert (p.flow_max, p.range_min, p.range_max) == (7.4, 0.08, 30.0)
 

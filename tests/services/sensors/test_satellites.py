@@ -120,7 +120,7 @@ def test_errors_are_least_squares_of_range_errors():
 
 
 @pytest.mark.parametrize("preset", ["rtk", "standard"])
-def test_preset_has_its_horizontal_error_by_satellites_too(preset):
+def test_constellation_keeps_horizontal_error_of_preset(preset):
     """Root mean square over a day, within 10 %."""
     p = gps.PRESETS[preset]
     result = readings(p._replace(constellation=GALILEO, latency_samples=0, rate=1.0 / 600.0), 144)
@@ -129,7 +129,7 @@ def test_preset_has_its_horizontal_error_by_satellites_too(preset):
     assert np.sqrt(0.5 * variance) == pytest.approx(np.sqrt(stated), rel=0.1)
 
 
-def test_position_jumps_when_a_satellite_leaves():
+def test_position_jumps_when_visible_satellites_change():
     """The jump is the difference of the two least-squares solutions; between jumps the errors change continuously."""
     p = gps.Gps(constellation=GALILEO, range_correlated_error=3.0, correlation_time=1e9, rate=0.1)
     result = readings(p, 1000)
@@ -220,14 +220,14 @@ def test_multipath_moves_fix_near_walls_only():
         np.testing.assert_allclose(places([far])[0], (500.0, 0.0, 1.0), atol=1e-6)
 
 
-def test_first_fix_comes_at_stated_time():
+def test_time_to_first_fix_is_stated_value():
     result = readings(gps.Gps(time_to_first_fix=2.6, rate=10.0), 40)
     assert [r.valid for r in result] == [k >= 26 for k in range(40)]
 
 
 @pytest.mark.long
 def test_rtk_solution_converges_and_falls_back():
-    """Fixed; single once corrections are older than 2 s; then float for 3 s, then fixed; errors by their ratios."""
+    """Fixed; single when corrections are older than 2 s; float for 3 s, then fixed; errors in the stated ratios."""
     rtk = Rtk(20.0, 100.0, 3.0, 5, 2.0, (Gap(1.0, 5.0),))
     p = gps.Gps(correlated_error_horizontal=0.01, correlated_error_vertical=0.015, correlation_time=1e9, rtk=rtk)
     result = readings(p, 100)
@@ -249,7 +249,7 @@ def test_rtk_is_float_with_few_satellites():
     assert {r.fix for r in readings(p, 5)[1:]} == {GPS_FLOAT}
 
 
-def test_messages_hold_kind_of_fix_and_dilution():
+def test_messages_contain_kind_of_fix_and_dilution():
     columns = [
         GpsReading(40.0, 14.0, 300.0, (0.04, 0.09, 0.25), (3.0, 4.0, -1.0), 0.01, 0.1, True, kind, 9, 11, 0.9, 1.2)
         for kind in (GPS_SINGLE, GPS_FLOAT, GPS_RTK)

@@ -63,9 +63,9 @@ def follower_setpoint(core, tick):
 
 
 def leader_setpoint(core, tick):
-    from lapwing.services.trajectory import block as own
+    from lapwing.services.trajectory import block as trajectory_block
 
-    return own.step(core.leader, 0.0, tick, ())[1][0]
+    return trajectory_block.step(core.leader, 0.0, tick, ())[1][0]
 
 
 def test_follower_keeps_its_place_relative_to_leader(tmp_path):
@@ -75,7 +75,7 @@ def test_follower_keeps_its_place_relative_to_leader(tmp_path):
     x, y = -3.0 + 1.0, 1.0
     rotated = (math.cos(1.5) * x - math.sin(1.5) * y, math.sin(1.5) * x + math.cos(1.5) * y)
     assert end.position_world[:2] == pytest.approx((6.0 + rotated[0], 0.5 + rotated[1]))
-    assert end.position_world[2] == pytest.approx(start.position_world[2])  # on its own resting height
+    assert end.position_world[2] == pytest.approx(start.position_world[2])  # at the follower's resting height
     assert end.yaw == pytest.approx(1.8)
     assert (follower_setpoint(core, 1400).final, follower_setpoint(core, 1600).final) == (False, True)
     assert [follower_setpoint(core, tick).phase for tick in (0, 800)] == [0, 1]

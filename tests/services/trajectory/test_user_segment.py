@@ -41,12 +41,12 @@ def scene(folder, module=MODULE, name="line", **keys):
 
 
 def test_user_segment_equals_shipped_kind_without_file(tmp_path):
-    shipped, own = scene(tmp_path, name=""), scene(tmp_path)
+    shipped, user = scene(tmp_path, name=""), scene(tmp_path)
     (tmp_path / "line.py").unlink()
-    again = from_resolved(own.resolved, "hover")
-    digests = {fly(resolve(made)).digest for made in (shipped, own, again)}
+    restored = from_resolved(user.resolved, "hover")
+    digests = {fly(resolve(made)).digest for made in (shipped, user, restored)}
     assert len(digests) == 1
-    path = resolve(own).services["trajectory"].parameters.core.path
+    path = resolve(user).services["trajectory"].parameters.core.path
     np.testing.assert_array_equal(path.z.coefficients[0][:2], [0.0, 0.25])
 
 

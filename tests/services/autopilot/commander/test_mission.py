@@ -57,7 +57,7 @@ def test_mission_continues_after_landing_without_disarming():
     assert flight.setpoint.position_world == pytest.approx((0.0, 0.0, 0.35), abs=0.1)
 
 
-def test_line_has_no_braking_and_corner_keeps_radius():
+def test_vehicle_brakes_at_corner_but_not_on_straight_leg():
     far = [item("waypoint", 15.0 * k, 0.0, 3.0) for k in range(1, 5)]
     flight = mission(item("takeoff", z=3.0), *far, item("waypoint", 60.0, 40.0, 3.0))
     assert flight.until(lambda s: s.mission_state == 5)
@@ -158,7 +158,7 @@ def test_conditions_delay_items_without_stop():
         assert max(flight.speeds((36.0, 0.0), 1.0)) == pytest.approx(2.0, abs=0.2)
 
 
-def test_mission_turns_relatively_and_sets_home():
+def test_mission_items_set_relative_yaw_and_home():
     flight = mission(
         item("takeoff", z=3.0), item("waypoint", 0.0, 9.0, 3.0, hold=3.0), item("yaw", yaw=-1.0, values=(1.0,)),
         item("set_home"), item("waypoint", 9.0, 9.0, 3.0), item("return"), parameters={"MPC_YAW_MODE": 5},

@@ -8,7 +8,7 @@ from lapwing.services.autopilot.initial_estimate import EXACT, NOT_STARTED
 
 
 def with_sonar(constants=CONSTANTS):
-    """Return a session of a vehicle with every source; the scene's true state replaces all but the sonar."""
+    """Return a session of a vehicle with every source; the true state of the scene replaces all except the sonar."""
     session = Session(constants._replace(has_trajectory=False))
     session.commander.state.guidance.parameters["SYS_HAS_NUM_DIST"] = 1.0
     return session
@@ -53,7 +53,7 @@ def test_commander_without_operator_has_no_arming_checks():
     ("source", "parameter"),
     [("magnetometer", "SYS_HAS_MAG"), ("barometer", "SYS_HAS_BARO"), ("sonar", "SYS_HAS_NUM_DIST")],
 )
-def test_sensor_that_arming_does_not_require(source, parameter):
+def test_sensor_blocks_arming_only_if_required(source, parameter):
     session = with_sonar()
     bits = 1 << SOURCES.index(source)
     for required, blockers in ((1.0, (f"no good readings of the {source}",)), (0.0, ())):

@@ -1,4 +1,4 @@
-"""Returns: goal, altitude, and path around the fence."""
+"""Return mode: goal, altitude, and path around the fence."""
 
 import itertools
 import math

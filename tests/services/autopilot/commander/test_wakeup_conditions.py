@@ -1,4 +1,4 @@
-"""A commander called only at wake-ups has bit-for-bit the outputs of one called at every tick."""
+"""Outputs of a commander called only at wake-ups: bit-for-bit those of a call at every tick."""
 
 import math
 
@@ -83,7 +83,7 @@ def plain(value):
 
 
 def views(flight, orders=()):
-    """Yield (view, estimate is due) of each tick, with the estimate of the last wake-up. Send each output."""
+    """Yield each tick's view and True if its estimate is new. Send the commander's output back to the generator."""
     tick, last_estimate, every_tick = 0, EXACT, False
     for ticks, different in flight:
         now = dict(SOUND)
@@ -119,11 +119,11 @@ def skip(commander, missed):
 
 
 NO_MESSAGES = {"acknowledgements": (), "texts": (), "parameters": None, "faults": None}
-"""Return the outputs that are sent once."""
+"""Outputs that are sent only once."""
 
 
 def check_same(vehicle, flight, orders=()):
-    """Fly with a commander that is called at every tick, and one that is called only at wake-ups."""
+    """Check that calls at every tick and calls only at wake-ups have the same outputs."""
     dense, sparse = Commander(vehicle), Commander(vehicle)
     reported = views(flight, orders)
     view, due = next(reported)

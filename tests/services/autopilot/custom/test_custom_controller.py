@@ -115,17 +115,17 @@ def test_voltages_are_clipped_to_range(scene):
 
 
 def test_configuration_has_controller_text(scene, tmp_path):
-    own = scene("own_python", IN_PYTHON, "Altitude", "run.duration=1.5")
-    before = fly(own).digest
+    custom = scene("own_python", IN_PYTHON, "Altitude", "run.duration=1.5")
+    before = fly(custom).digest
     (tmp_path / "own_python.py").unlink()
-    assert fly(from_resolved(own.resolved, "hover")).digest == before
-    assert resolve(own).modules["own_python"] == IN_PYTHON
-    assert own.sources["modules.own_python.py"].decode() == IN_PYTHON
+    assert fly(from_resolved(custom.resolved, "hover")).digest == before
+    assert resolve(custom).modules["own_python"] == IN_PYTHON
+    assert custom.sources["modules.own_python.py"].decode() == IN_PYTHON
 
 
 def test_log_resimulates_without_file_with_allowed_code(scene, tmp_path):
-    own, log = scene("own_python", IN_PYTHON, "Altitude", "run.duration=1.5"), tmp_path / "own.mcap"
-    fly_single(resolve(own), log)
+    custom, log = scene("own_python", IN_PYTHON, "Altitude", "run.duration=1.5"), tmp_path / "own.mcap"
+    fly_single(resolve(custom), log)
     (tmp_path / "own_python.py").unlink()
     with pytest.raises(ValueError, match=r"contains code of its author \(modules.own_python.py\)"):
         resimulate(log)
@@ -134,12 +134,12 @@ def test_log_resimulates_without_file_with_allowed_code(scene, tmp_path):
 
 
 def test_autopilot_process_runs_controller_text_of_configuration(scene, tmp_path):
-    own, log = scene("own_python", IN_PYTHON, "Altitude", "run.duration=1.5"), tmp_path / "own.mcap"
-    values = ProcessSpec("mission", resolve(own), {}, "test-own-controller", log=str(log))
+    custom, log = scene("own_python", IN_PYTHON, "Altitude", "run.duration=1.5"), tmp_path / "own.mcap"
+    values = ProcessSpec("mission", resolve(custom), {}, "test-own-controller", log=str(log))
     (tmp_path / "own_python.py").unlink()
     fly_processes(values, Silent())
     with LogReader(log) as read:
-        assert read.digest() == fly(own).digest
+        assert read.digest() == fly(custom).digest
 
 
 def test_edited_module_is_reloaded(scene):

@@ -1,4 +1,4 @@
-"""Selection of MAVLink frames, in any pieces and after any garbage."""
+"""Selection of MAVLink frames from a stream that arrives in any pieces and contains garbage."""
 
 from hypothesis import given
 from hypothesis import strategies as st
@@ -34,7 +34,7 @@ def test_garbage_before_frame_is_dropped():
     assert FrameFilter(NEEDED).select(b"\x00junk" + beat) == beat
 
 
-def test_signed_frame_passes_as_one():
+def test_signed_frame_passes_whole():
     codec = mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
     codec.signing.secret_key, codec.signing.sign_outgoing = bytes(32), True
     beat = MESSAGES[0].pack(codec)

@@ -181,7 +181,7 @@ def test_restarted_firmware_gets_mission_and_is_armed():
     client = make(vehicle, parameters={"MPC_XY_VEL_MAX": 5.0})
     fly(vehicle, client, 5.0)
     assert client.stage is Stage.FLYING
-    vehicle.beat()  # last heartbeat of the old program, armed
+    vehicle.beat()  # last heartbeat of the previous program, armed
     vehicle.armed, vehicle.items = False, {}
     vehicle.parameters["MPC_XY_VEL_MAX"] = (12.0, 9)
     client.restart()
