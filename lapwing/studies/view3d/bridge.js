@@ -10,9 +10,10 @@
   const slow = /swiftshader|llvmpipe|softpipe|basic render/i.test(device ? probe.getParameter(device.UNMASKED_RENDERER_WEBGL) : "");
   const smooth = location.hash === "#smooth"; // set for images, which need not be drawn in real time
   probe?.getExtension("WEBGL_lose_context")?.loseContext();
+  const CHEAP = { alpha: false, preserveDrawingBuffer: false }; // no blending with the page, no copy of each image
   const context = HTMLCanvasElement.prototype.getContext;
   HTMLCanvasElement.prototype.getContext = function (kind, options) {
-    return context.call(this, kind, slow && kind === "webgl2" ? { ...options, antialias: smooth } : options);
+    return context.call(this, kind, slow && kind === "webgl2" ? { ...options, ...CHEAP, antialias: smooth } : options);
   };
 
   // The player updates its bar at 120 Hz, faster than recordings and screens.
@@ -76,6 +77,16 @@
     }
   }
 
+  function flattenSky(scene) { // draws the background first instead of at a depth, which each of its pixels would write
+    scene.traverse((object) => {
+      const { material } = object;
+      if (!material?.uniforms?.colorMap?.value) return;
+      material.fragmentShader = "varying vec2 vUv; uniform sampler2D colorMap; void main() { gl_FragColor = vec4(texture(colorMap, vUv).rgb, 1.0); }";
+      Object.assign(material, { depthTest: false, depthWrite: false, needsUpdate: true });
+      object.renderOrder = -1;
+    });
+  }
+
   function simplify(now, at) { // uses one small shadow around the selected vehicle instead of three
     const lights = now.scene.children.filter((child) => child.isDirectionalLight && child.castShadow);
     if (!lights.length) return;
@@ -88,7 +99,14 @@
     const fresh = !light.shadow.around;
     light.shadow.around = at.place;
     if (fresh) {
-      if (!smooth) now.gl.shadowMap.type = 0; // a hard edge
+      if (!smooth) {
+        now.gl.shadowMap.type = 0; // a hard edge
+        light.shadow.mapSize.set(512, 512);
+        light.shadow.map?.dispose();
+        light.shadow.map = null;
+        now.gl.shadowMap.autoUpdate = false; // see `follow`
+      }
+      flattenSky(now.scene);
       const update = light.shadow.updateMatrices; // called by three.js before it draws the shadow map
       light.shadow.updateMatrices = function (source) {
         const [x, y, z] = this.around, { camera } = this, toward = camera.position.clone();
@@ -102,6 +120,7 @@
     }
   }
 
+  let turns = 0; // calls of `follow`
   let drawn = "", placed = "", changed = 0; // keys of the last drawn and placed state, time of the last change [ms]
   function follow() {
     const now = state();
@@ -117,7 +136,10 @@
         view.changed?.();
       }
       drawn = next;
-      if (slow) simplify(now, at);
+      if (slow) {
+        simplify(now, at);
+        now.gl.shadowMap.needsUpdate ||= view.filming || ++turns % 2 === 0; // at the rate of a recording
+      }
       if (slow && !smooth && !view.filming) { // a quarter of the pixels during motion
         const ratio = devicePixelRatio * (performance.now() - changed < 1500 ? 0.5 : 1);
         if (now.viewport.dpr !== ratio) now.setDpr(ratio);
