@@ -118,7 +118,9 @@ def test_only_closed_mesh_is_drawn_from_one_side(is_open):
 
 def test_dashes_have_their_length_and_skip_rest_and_missing_points():
     rest = np.zeros((50, 3))
-    path = np.concatenate([[(np.nan,) * 3], rest, [(1.0, 0.0, 0.0), (2.0, 0.0, 0.0)], rest + (2.0, 0.0, 0.0)])
+    path = np.concatenate(
+        [[(np.nan,) * 3], rest, [(1.0, 0.0, 0.0), (2.0, 0.0, 0.0)], np.tile((2.0, 0.0, 0.0), (50, 1))]
+    )
     result = dashes(path, 0.1, 750)
     assert result[:, 0, 0] == pytest.approx(np.arange(10) / 5.0)
     assert result[:, 1] - result[:, 0] == pytest.approx(np.tile((0.1, 0.0, 0.0), (10, 1)))
