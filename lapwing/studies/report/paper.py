@@ -48,7 +48,7 @@ def write_pdf(path: Path, cover: Cover, plots: Iterable[Titled]) -> None:
     with (
         plot_style(),
         rc_context({"font.size": FONT, "axes.titlesize": FONT}),
-        PdfPages(path, metadata={"CreationDate": None}) as out,
+        PdfPages(path, metadata={"Title": cover.title, "CreationDate": None}) as out,
     ):
         for number, sheet in enumerate(chain([_cover(cover)], map(_page, packed)), 1):
             text = f"{cover.title} · page {number} of {1 + len(packed)}"
