@@ -302,6 +302,7 @@ def test_neither_matplotlib_nor_plotly_is_imported_for_page(log):
 @pytest.mark.long
 def test_same_plots_on_paper(log, page, tmp_path):
     pdf = write(FlightData.read(log), tmp_path / "circle.pdf").read_bytes()
+    assert b"/Title (" in pdf
     assert pdf.startswith(b"%PDF")
     sizes = re.findall(rb"/MediaBox \[ 0 0 ([\d.]+) ([\d.]+) \]", pdf)
     assert 1 < len(sizes) <= 1 + len(page.plots)

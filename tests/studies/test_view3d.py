@@ -25,7 +25,7 @@ from lapwing.studies.view3d.local_server import run_server
 from lapwing.studies.view3d.recording import page as view_page
 from lapwing.studies.view3d.rotors import Rotors
 from lapwing.studies.view3d.samples import sample
-from lapwing.studies.view3d.sampling import along
+from lapwing.studies.view3d.sampling import along, dashes
 from lapwing.studies.view3d.stage import Vehicle, error_colours, reach
 from lapwing.studies.view3d.surroundings import add_surroundings
 from lapwing.studies.view3d.vehicle_bodies import motion
@@ -107,6 +107,25 @@ def test_coloured_mesh_is_read_with_its_shape_and_colours(tmp_path):
     colours = np.frombuffer(data, "<u2", 4 * len(mesh.vertices), place).reshape(-1, 4) / 65535.0
     for row, colour in ((0, (0.791, 0.347, 0.0, 1.0)), (-1, (0.00700, 0.00913, 0.01161, 1.0))):  # linear
         assert colours[row] == pytest.approx(colour, abs=1e-3)
+
+
+@pytest.mark.parametrize("is_open", [False, True])
+def test_only_closed_mesh_is_drawn_from_one_side(is_open):
+    data = coloured_mesh([solids.box((0.0,) * 3, (1.0,) * 3, "#E69F00")._replace(open=is_open)])
+    text = json.loads(data[20 : 20 + int.from_bytes(data[12:16], "little")])
+    assert text["materials"][0]["doubleSided"] is is_open
+
+
+def test_dashes_have_their_length_and_skip_rest_and_missing_points():
+    rest = np.zeros((50, 3))
+    path = np.concatenate(
+        [[(np.nan,) * 3], rest, [(1.0, 0.0, 0.0), (2.0, 0.0, 0.0)], np.tile((2.0, 0.0, 0.0), (50, 1))]
+    )
+    result = dashes(path, 0.1, 750)
+    assert result[:, 0, 0] == pytest.approx(np.arange(10) / 5.0)
+    assert result[:, 1] - result[:, 0] == pytest.approx(np.tile((0.1, 0.0, 0.0), (10, 1)))
+    assert len(dashes(path, 0.1, 4)) == 4
+    assert len(dashes(rest, 0.1, 4)) == 0
 
 
 def test_samples_follow_pose_wind_and_thrust():

@@ -49,7 +49,7 @@ def write_pdf(path: Path, cover: Cover, plots: Iterable[Titled]) -> None:
     with (
         plot_style(),
         rc_context({"font.size": FONT, "axes.titlesize": FONT}),
-        PdfPages(document, metadata={"CreationDate": None}) as out,
+        PdfPages(document, metadata={"Title": cover.title, "CreationDate": None}) as out,
     ):
         for number, sheet in enumerate(chain([_cover(cover)], map(_page, packed)), 1):
             text = f"{cover.title} · page {number} of {1 + len(packed)}"

@@ -4,16 +4,7 @@
   const looks = { darkMode: matchMedia("(prefers-color-scheme: dark)").matches };
   Object.defineProperty(window, "__VISER_EMBED_CONFIG__", { get: () => looks, set() {} }); // overrides the configuration of a recording
 
-  // A software renderer draws simplified images: see `simplify`.
-  const probe = document.createElement("canvas").getContext("webgl2");
-  const device = probe?.getExtension("WEBGL_debug_renderer_info");
-  const slow = /swiftshader|llvmpipe|softpipe|basic render/i.test(device ? probe.getParameter(device.UNMASKED_RENDERER_WEBGL) : "");
-  const smooth = location.hash === "#smooth"; // set for images, which need not be drawn in real time
-  probe?.getExtension("WEBGL_lose_context")?.loseContext();
-  const context = HTMLCanvasElement.prototype.getContext;
-  HTMLCanvasElement.prototype.getContext = function (kind, options) {
-    return context.call(this, kind, slow && kind === "webgl2" ? { ...options, antialias: smooth } : options);
-  };
+  const { slow, smooth, simplify } = window.lapwingSoftware;
 
   // The player updates its bar at 120 Hz, faster than recordings and screens.
   const every = window.setInterval;
@@ -76,32 +67,6 @@
     }
   }
 
-  function simplify(now, at) { // uses one small shadow around the selected vehicle instead of three
-    const lights = now.scene.children.filter((child) => child.isDirectionalLight && child.castShadow);
-    if (!lights.length) return;
-    const [light, ...others] = lights, half = 3 * facts.size, height = 200;
-    for (const other of others) {
-      light.intensity += other.intensity;
-      other.castShadow = other.visible = false;
-      other.intensity = 0;
-    }
-    const fresh = !light.shadow.around;
-    light.shadow.around = at.place;
-    if (fresh) {
-      if (!smooth) now.gl.shadowMap.type = 0; // a hard edge
-      const update = light.shadow.updateMatrices; // called by three.js before it draws the shadow map
-      light.shadow.updateMatrices = function (source) {
-        const [x, y, z] = this.around, { camera } = this, toward = camera.position.clone();
-        toward.set(0.2, 1, 0.2).normalize().multiplyScalar(0.5 * height);
-        source.matrixWorld.makeTranslation(x - toward.x, y + toward.y, z - toward.z);
-        source.target.matrixWorld.makeTranslation(x, y, z);
-        Object.assign(camera, { left: -half, right: half, bottom: -half, top: half, near: 0.1, far: height });
-        camera.updateProjectionMatrix();
-        update.call(this, source);
-      };
-    }
-  }
-
   let drawn = "", placed = "", changed = 0; // keys of the last drawn and placed state, time of the last change [ms]
   function follow() {
     const now = state();
@@ -117,7 +82,7 @@
         view.changed?.();
       }
       drawn = next;
-      if (slow) simplify(now, at);
+      if (slow) simplify(now, at, view.filming);
       if (slow && !smooth && !view.filming) { // a quarter of the pixels during motion
         const ratio = devicePixelRatio * (performance.now() - changed < 1500 ? 0.5 : 1);
         if (now.viewport.dpr !== ratio) now.setDpr(ratio);

@@ -29,7 +29,8 @@ def coloured_mesh(solids: Sequence[Solid]) -> bytes:
         {"bufferView": 2, "componentType": UINT, "count": int(faces.size), "type": "SCALAR"},
     ]
     attributes = {"POSITION": 0, "COLOR_0": 1}
-    material = {"doubleSided": True, "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 1.0}}
+    is_open = any(solid.open for solid in solids)
+    material = {"doubleSided": is_open, "pbrMetallicRoughness": {"metallicFactor": 0.0, "roughnessFactor": 1.0}}
     document = {
         "asset": {"version": "2.0"},
         "scene": 0,

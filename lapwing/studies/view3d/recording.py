@@ -19,6 +19,7 @@ from lapwing.studies.view3d.surroundings import add_surroundings
 RATE = 30.0  # [1/s] frame rate of a recording
 FRAMES = 2000  # largest number of frames of a recording; the rate of a longer one is lower
 FLEET_FRAMES = 24000  # largest number of frames times vehicles
+SCRIPTS = ("software.js", "bridge.js", "toolbar.js")
 POINTS = 1500  # largest number of points of a trail
 
 
@@ -110,6 +111,6 @@ def with_bridge(html: str, facts: dict[str, Any]) -> str:
         facts: "names" and "colours" of the vehicles, "size" of the largest [m], "start" [s], largest "error" [m],
             "live"; for a recording "span", the times of the first and the last point of the trails [s].
     """
-    code = "".join((Path(__file__).parent / name).read_text(encoding="utf-8") for name in ("bridge.js", "toolbar.js"))
+    code = "".join((Path(__file__).parent / name).read_text(encoding="utf-8") for name in SCRIPTS)
     text = json.dumps(facts, separators=(",", ":")).replace("<", "\\u003c")
     return html.replace("<head>", f"<head><script>window.lapwing={text};{code}</script>", 1)

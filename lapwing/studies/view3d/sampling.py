@@ -31,6 +31,22 @@ def along(direction: np.ndarray) -> np.ndarray:
     return round_to_grid(result / np.linalg.norm(result, axis=1)[:, None])
 
 
+def dashes(path: np.ndarray, length: float, most: int) -> np.ndarray:
+    """Return segments of a dashed line along a path, shape (k, 2, 3).
+
+    Args:
+        path: points [m], shape (n, 3); there are no dashes at points with NaN.
+        length: length of a dash and of a gap [m]; longer if there were more than `most` dashes.
+    """
+    steps = np.nan_to_num(np.linalg.norm(np.diff(path, axis=0), axis=1))
+    way = np.concatenate([[0.0], np.cumsum(steps)])
+    length = max(length, 0.5 * way[-1] / most)
+    starts = np.arange(0.0, way[-1] - length, 2.0 * length)
+    ends = np.stack([starts, starts + length], axis=1)
+    result = np.stack([np.interp(ends, way, values) for values in path.T], axis=2)
+    return result[np.isfinite(result).all(axis=(1, 2))]
+
+
 def round_angle(angle: np.ndarray) -> np.ndarray:
     """Return angles [rad] rounded to 1 / ANGLES of a revolution."""
     step = 2.0 * np.pi / ANGLES

@@ -15,7 +15,7 @@ from lapwing.studies.view3d.coloured_mesh import coloured_mesh
 from lapwing.studies.view3d.ghosts import Ghost
 from lapwing.studies.view3d.rotors import BLADE, SHORTEST, Rotors
 from lapwing.studies.view3d.samples import Samples
-from lapwing.studies.view3d.sampling import along, rotate
+from lapwing.studies.view3d.sampling import along, dashes, rotate
 from lapwing.studies.view3d.scans import ScanPoints
 from lapwing.studies.view3d.solids import arrow, ball, box, merge, raise_point
 from lapwing.studies.view3d.surroundings import add_solid, rgb
@@ -25,6 +25,7 @@ WIND, FORCE, DESIRED, ESTIMATE = "#56B4E9", BOUND, "#4A5560", "#CC79A7"
 GHOSTS = {"reference": DESIRED, "estimate": ESTIMATE}
 SCAN_COLOURS = {"lidar": BOUND, "depth_camera": "#882255"}
 FLOWN_WIDTH, DESIRED_WIDTH, CABLE_WIDTH = 4.0, 2.0, 2.5  # [pixel]
+DASH, MOST_DASHES = 0.2, 750  # length of a dash of the desired path over the size of the vehicle; number of dashes
 WIND_SCALE = 0.12  # [m] of arrow for 1 m/s
 SIGMAS = 3.0  # standard deviations of the drawn ellipsoid
 EVERY = 3  # frames between two updates of an arrow
@@ -197,9 +198,10 @@ class Vehicle:
         return line
 
     def desired_path(self, path: np.ndarray) -> None:
-        """Add the desired path, shape (n, 3) [m], as a thin line."""
-        points = np.stack([path[:-1], path[1:]], axis=1).astype(np.float32)
-        _lines(self._scene, f"{self._root}/desired path", points[::2], DESIRED, DESIRED_WIDTH)
+        """Add the desired path, shape (n, 3) [m], as a thin dashed line."""
+        points = dashes(path, DASH * self._size, MOST_DASHES).astype(np.float32)
+        if len(points):
+            _lines(self._scene, f"{self._root}/desired path", points, DESIRED, DESIRED_WIDTH)
 
 
 def add_shaders(scene: Any) -> None:
