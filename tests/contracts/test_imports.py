@@ -1,11 +1,11 @@
-"""No module imports itself by way of others: not at the top, not inside of functions, not for type checkers only."""
+"""Absence of import cycles, including imports in functions and for type checkers only."""
 
 import ast
 from pathlib import Path
 
 
 def imports():
-    """The modules of this project that each module imports, anywhere in its source."""
+    """Return the modules of this project that each module imports anywhere in its source."""
     paths = [
         *Path("lapwing").rglob("*.py"),
         *Path("lapwing/services").rglob("*.py"),
@@ -28,7 +28,7 @@ def imports():
 
 
 def cycle(graph):
-    """A way from a module back to itself, None if there is none."""
+    """Return the names along an import cycle, or None."""
     done = set()
 
     def search(name, way):
@@ -49,7 +49,7 @@ def test_cycle_is_found():
     assert cycle({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == ["b", "c", "b"]
 
 
-def test_there_is_no_import_cycle():
+def test_project_has_no_import_cycle():
     graph = imports()
     assert len(graph) > 400
     assert cycle(graph) is None
