@@ -49,7 +49,7 @@ ROUNDED_BY_NUMPY = ROUNDED_BY_LIBRARY | {
     "linalg", "logspace", "matmul", "polyfit", "power", "tensordot", "vdot",
 }  # fmt: skip
 PREFIXES = ("NRT_", "Py", "_Py", "numba_", "mem", "_ZN")
-EXACT = {"ceil", "floor", "fmod", "nearbyint", "rint", "trunc"}  # without SSE 4.1, processors lack instructions for these
+EXACT = {"ceil", "floor", "fmod", "nearbyint", "rint", "trunc"}  # called on processors without SSE 4.1
 
 
 def _sources():
