@@ -1,5 +1,6 @@
-"""A run in one graph and one in a graph for each service, which hand each other bundles tick by tick as processes do,
-record the same bytes."""
+"""A run in one diagram records the same bytes as a run with a diagram for each service.
+
+The diagrams exchange step packets at each tick, as processes do."""
 
 import pytest
 from flights import OPERATED, command, scripted
@@ -42,7 +43,7 @@ CASES = {
 
 
 def fly_apart(setup, operator):
-    """Every service with a graph of its own; what it records comes through batches of uneven lengths."""
+    """Run each service in a separate diagram; its records arrive in log packets of unequal length."""
     services = create_all(setup, operator)
     graphs = {service.name: BlockDiagram(setup, [service], 64) for service in services}
     bundles = {name: StepPacketCodec(service.ports) for name, service in setup.services.items()}
@@ -68,7 +69,7 @@ def fly_apart(setup, operator):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_together_and_apart_record_same(name):
+def test_separate_diagrams_record_same_bytes(name):
     scene, overrides, duration, script = CASES[name]
     setup = resolve(load(scene, [*overrides, f"run.duration={duration}"]))
     operator = scripted(script) if script else None
@@ -79,7 +80,7 @@ def test_together_and_apart_record_same(name):
     assert apart.digest == together.digest
 
 
-def test_agreement_cases_cover_their_names():
+def test_cases_have_events_of_their_names():
     def flown(name):
         scene, overrides, duration, script = CASES[name]
         return fly(resolve(load(scene, [*overrides, f"run.duration={duration}"])), scripted(script) if script else None)

@@ -1,4 +1,4 @@
-"""Replay: timing is pure; what is published and recorded again has the log's digest."""
+"""Replay: timing, keys, and a recording with the digest of the replayed log."""
 
 import os
 import pty
@@ -51,11 +51,11 @@ def test_speed_scales_time_between_messages():
     assert [due.wait for due in schedule(messages(3), 2.0)] == pytest.approx([0.0, 0.002, 0.004])
 
 
-def test_at_top_speed_everything_is_due_at_once():
+def test_all_messages_are_due_at_once_at_maximum_speed():
     assert [due.wait for due in schedule(messages(3), None)] == [0.0, 0.0, 0.0]
 
 
-def test_time_counts_from_first_message_of_cut(log):
+def test_time_starts_at_first_selected_message(log):
     cut = Cut.of(0.1, 0.2)
     with LogReader(log) as source:
         due = list(schedule(source.messages(None, cut.start_ns, cut.end_ns), 1.0))
@@ -170,7 +170,7 @@ def test_equal_times_keep_their_order_through_three_generations(tmp_path, monkey
             assert list(log.messages()) == first
 
 
-def test_only_topics_that_are_named_are_replayed(log, tmp_path, monkeypatch):
+def test_only_named_topics_are_replayed(log, tmp_path, monkeypatch):
     monkeypatch.setattr(player, "SUBSCRIBER_TIMEOUT", 0.0)
     (endpoint,) = loopback_endpoints(["a"]).values()
     received, record = [], tmp_path / "a.mcap"
@@ -184,7 +184,7 @@ def test_only_topics_that_are_named_are_replayed(log, tmp_path, monkeypatch):
 
 
 class Terminal:
-    """A clock that runs while it is waited, and keys that are typed at certain times."""
+    """Clock that only advances while waiting, and keys typed at given times."""
 
     def __init__(self, typed):
         self.now, self.typed, self.said = 0.0, dict(typed), []
@@ -207,7 +207,7 @@ class Terminal:
         return result
 
 
-def test_pause_holds_and_rest_follows_at_its_distance():
+def test_messages_after_pause_keep_their_distance():
     terminal = Terminal({1.5: " ", 6.0: " "})
     went = terminal.went([(float(k), k) for k in range(5)])
     assert went[:2] == pytest.approx([0.0, 1.0], abs=0.03)
@@ -216,7 +216,7 @@ def test_pause_holds_and_rest_follows_at_its_distance():
     assert [line.split()[0] for line in terminal.said] == ["paused", "resumed"]
 
 
-def test_step_lets_all_messages_of_one_instant_go():
+def test_step_publishes_all_messages_of_one_instant():
     terminal = Terminal({0.5: " ", 10.0: ".", 20.0: ".", 30.0: "q"})
     went = terminal.went([(0.0, 0), (1.0, 7), (1.0, 7), (2.0, 9), (3.0, 11)])
     assert went == pytest.approx([0.0, 10.0, 10.0, 20.0], abs=0.05)
@@ -238,7 +238,7 @@ def test_terminal_keys_are_read_and_terminal_is_restored():
     assert termios.tcgetattr(theirs) == before
     reading, writing = os.pipe()
     os.write(writing, b"q")
-    with Keyboard(reading) as keyboard:  # no terminal: what comes there is somebody else's
+    with Keyboard(reading) as keyboard:  # not a terminal: the input belongs to another program
         assert keyboard.keys() == ""
     for descriptor in (ours, theirs, reading, writing):
         os.close(descriptor)

@@ -1,4 +1,4 @@
-"""A run is held while it is too far ahead of its log, and says what it waits for."""
+"""A run waits while it is too far ahead of its log, and reports that it waits for the log."""
 
 import struct
 import threading
@@ -23,7 +23,7 @@ from lapwing.messages import Clock, stamp
 
 
 class Bus:
-    """A bus to oneself."""
+    """Bus that returns its own messages."""
 
     def __init__(self):
         self.said = []
@@ -39,7 +39,7 @@ class Bus:
 
 
 class Process:
-    """A participant that is told that 3000 ticks more are recorded whenever it has to wait."""
+    """Participant whose log advances by 3000 ticks during each wait."""
 
     participants = PublisherIds("test")
 
@@ -55,7 +55,7 @@ class Process:
 def test_run_waits_while_log_is_behind():
     process = Process()
     held, teller = LogBackpressure(process, "recorder"), LogProgressPublisher(process.bus, "test", "recorder")
-    for tick in range(0, 10 * AHEAD, LOOK):  # nobody records
+    for tick in range(0, 10 * AHEAD, LOOK):  # without a recorder
         held.wait_for_log(tick)
     assert process.waits == []
     teller.recorded(0)
@@ -68,7 +68,7 @@ def test_run_waits_while_log_is_behind():
 
 
 @pytest.mark.parametrize(("vehicles", "ahead"), [(1, AHEAD), (2, AHEAD // 2), (50, LEAST)])
-def test_more_vehicles_run_has_fewer_ticks_wait_for_its_log(vehicles, ahead):
+def test_allowed_lead_over_log_shrinks_with_vehicles(vehicles, ahead):
     process = Process(vehicles)
     held, teller = LogBackpressure(process, "recorder"), LogProgressPublisher(process.bus, "test", "recorder")
     teller.recorded(0)
@@ -78,8 +78,8 @@ def test_more_vehicles_run_has_fewer_ticks_wait_for_its_log(vehicles, ahead):
     assert process.waits
 
 
-def test_waiting_run_has_published_all_needed_log_packets():
-    assert LEAST >= PAGE + LOOK + SHORTEST  # a batch that is not yet handed over, and a chunk that is not yet full
+def test_allowed_lead_covers_unrecorded_ticks():
+    assert LEAST >= PAGE + LOOK + SHORTEST  # an unsent log packet and an incomplete chunk
 
 
 def test_progress_reports_waiting_for_disk():

@@ -1,4 +1,4 @@
-"""Processes that are started before it is known what they are given."""
+"""Child processes: early start before the run configuration is known, forks, and their ends."""
 
 import os
 import signal
@@ -23,7 +23,7 @@ def test_unused_early_child_is_terminated():
     try:
         assert taken.process.poll() is None
         taken.process.stdin.close()
-        assert taken.process.wait(60.0) == 1  # nobody will tell it what to do
+        assert taken.process.wait(60.0) == 1  # it received no configuration
         taken.output.seek(0)
         assert taken.output.read() == b""
     finally:
@@ -68,7 +68,7 @@ def test_fork_exits_like_separate_program():
 
 
 @pytest.mark.parametrize(("end", "number"), [("kill", signal.SIGKILL), ("send_signal", signal.SIGTERM)])
-def test_fork_is_ended_by_signal_and_then_let_alone(end, number):
+def test_fork_is_ended_by_signal_and_may_be_killed_twice(end, number):
     with tempfile.TemporaryFile() as output:
         child = Forked(lambda: time.sleep(60.0), output)
         child.stdin.close()
@@ -79,8 +79,8 @@ def test_fork_is_ended_by_signal_and_then_let_alone(end, number):
         child.kill()
 
 
-def test_fork_has_no_other_files_open():
-    """Its launcher's end of the standard input of another one would keep that one waiting when the launcher is gone."""
+def test_fork_closes_files_of_other_forks():
+    """A fork with another child's standard input open would prevent that child's end after the launcher's."""
     with tempfile.TemporaryFile() as first_said, tempfile.TemporaryFile() as second_said:
         first = Forked(lambda: os.read(0, 1), first_said)
         second = Forked(lambda: time.sleep(60.0), second_said)

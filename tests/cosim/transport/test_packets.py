@@ -1,4 +1,4 @@
-"""Bundles of rows and batches of messages: out and in again; what is no bundle or batch is refused."""
+"""Step packets and log packets: round trips, and rejection of invalid packets."""
 
 from typing import NamedTuple
 
@@ -15,14 +15,14 @@ from tests.cosim.small_graph import graph_of
 
 
 class Pair(NamedTuple):
-    """A port of two numbers."""
+    """Port of two numbers."""
 
     left: float
     right: float
 
 
 class Single(NamedTuple):
-    """A port of a number and a truth value."""
+    """Port of a number and a Boolean."""
 
     number: float
     good: bool
@@ -32,7 +32,7 @@ PORTS = (Port("pair", Pair(0.0, 0.0)), Port("slow", Single(0.0, False), 5), Port
 
 
 class User:
-    """Stands for a service that uses some of the ports."""
+    """Service that uses some of the ports."""
 
     name = "user"
     outputs = ()
@@ -41,7 +41,7 @@ class User:
         self.inputs = tuple(InputPort(name) for name in names)
 
     def bind(self, graph):
-        """Nothing to be prepared."""
+        """Do nothing."""
 
 
 def graph(*names):
@@ -49,7 +49,7 @@ def graph(*names):
 
 
 def filled(tick):
-    """A graph in which the ports that are due at `tick` have a value of that tick."""
+    """Return a diagram with values of the due ports at `tick`."""
     result = graph("pair", "slow", "slower")
     for port in PORTS:
         if tick % port.period == 0:
@@ -83,7 +83,7 @@ def test_service_without_due_port_has_no_packet():
 
 
 def run_of(ticks):
-    """A graph whose ports have values at each of the ticks [0, ticks) at which they are due."""
+    """Return a diagram with values of the due ports at each tick in [0, ticks)."""
     result = graph("pair", "slow", "slower")
     for port in PORTS:
         for tick in range(0, ticks, port.period):
@@ -128,7 +128,7 @@ def page(topic, first, n, size, seed=0):
 
 
 def records(n):
-    """A page whose payloads are records, as `Wire` makes them."""
+    """Return a batch whose payloads are records, as `TopicEncoder` makes them."""
     dtype = np.dtype({"names": ["x", "all"], "formats": ["<f8", "V12"], "offsets": [4, 0], "itemsize": 12})
     result = np.zeros(n, dtype)
     result["x"] = np.arange(n)
