@@ -58,7 +58,7 @@ def test_participant_with_other_configuration_is_rejected(tmp_path):
         assert len(output.splitlines()) == 1
 
 
-def test_certified_links_give_digest_of_single_process(tmp_path):
+def test_digest_over_certified_links_equals_single_process(tmp_path):
     keys, log, alone = tmp_path / "keys", tmp_path / "log.mcap", tmp_path / "alone.mcap"
     make(keys, ["plant", "recorder"], 1)
     peers = {name: end.replace("tcp/", "tls/") for name, end in loopback_endpoints(["plant", "recorder"]).items()}

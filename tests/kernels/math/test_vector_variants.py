@@ -1,4 +1,4 @@
-"""Loops over elementary functions are vectorised, with the bits of the functions."""
+"""Loops over elementary functions are vectorised and equal the functions bit for bit."""
 
 import math
 import re
@@ -50,7 +50,7 @@ def _arguments(name):
 
 
 @pytest.mark.parametrize("name", sorted(KERNELS))
-def test_loop_has_bits_of_function(name):
+def test_loop_equals_function_bit_for_bit(name):
     x, *y = _arguments(name)
     result, second = np.empty_like(x), np.array(y[0]) if y else np.empty_like(x)
     _loop(name)(result, x, second)
