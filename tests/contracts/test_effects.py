@@ -66,7 +66,7 @@ def made(name, table):
 
 
 @pytest.mark.parametrize("name", effects.names())
-def test_is_documented(name):
+def test_effect_docstring_has_range_and_equation(name):
     """The docstring has the range of validity and an equation of theory.md."""
     text = effects.parameter_class(name).__doc__
     assert "Valid" in text
@@ -75,7 +75,7 @@ def test_is_documented(name):
 
 
 @pytest.mark.parametrize("name", effects.names())
-def test_registers_hook(name):
+def test_effect_registers_hook(name):
     assert any(effects.parameter_class(name) in registered for registered in hooks.HOOKS.values())
 
 

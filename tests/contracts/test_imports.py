@@ -15,15 +15,15 @@ def imports():
     names = {name.removesuffix(".__init__"): path for path, name in files.items()}
     result = {}
     for name, path in names.items():
-        taken = set()
+        imported = set()
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Import):
-                taken |= {alias.name for alias in node.names}
+                imported |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and node.module:
                 inner = {f"{node.module}.{alias.name}" for alias in node.names}
-                taken |= inner & names.keys() or {node.module}
-                taken |= {node.module} if inner - names.keys() else set()
-        result[name] = (taken & names.keys()) - {name}
+                imported |= inner & names.keys() or {node.module}
+                imported |= {node.module} if inner - names.keys() else set()
+        result[name] = (imported & names.keys()) - {name}
     return result
 
 

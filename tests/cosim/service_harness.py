@@ -17,7 +17,7 @@ class Alone:
     def __init__(self, scene: Scene, name: str):
         self.setup = resolve(scene)
         self.graph = BlockDiagram(self.setup, [create(self.setup, name)], KEPT_TICKS)
-        self._delays = {taken.port: taken.delay for taken in self.setup.services[name].inputs}
+        self._delays = {each.port: each.delay for each in self.setup.services[name].inputs}
 
     def step(self, **given: Any) -> None:
         """Step the next tick; `given` has the values of its due inputs, by port."""

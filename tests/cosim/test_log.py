@@ -66,7 +66,7 @@ def test_log_is_read_in_order_of_time_then_writing(path, flush_each):
 
 
 @pytest.mark.parametrize("flush_each", [0, 20])
-def test_selection(path, flush_each):
+def test_log_is_read_by_topic_and_time(path, flush_each):
     entries = messages()
     write(path, entries, flush_each=flush_each)
     with LogReader(path) as log:
@@ -182,7 +182,7 @@ def test_log_of_killed_writer_is_readable(path):
         assert [t for _, _, t, _ in log.messages()] == list(range(1000))
 
 
-def test_truncated_log_reads_to_last_whole_chunk(path, tmp_path):
+def test_truncated_log_is_read_to_last_complete_chunk(path, tmp_path):
     entries = messages(60)
     write(path, entries, flush_each=20)
     whole = path.read_bytes()

@@ -138,7 +138,7 @@ def test_other_tools_find_messages_of_page_by_time(tmp_path):
         assert [time_ns for _, time_ns, _ in result] == expected
 
 
-def test_equal_pages_give_equal_file_at_any_wall_time(tmp_path, monkeypatch):
+def test_file_of_equal_pages_is_independent_of_wall_time(tmp_path, monkeypatch):
     files = []
     for speed in (0.01, 3.0):
         clock = itertools.count(0.0, speed)

@@ -73,9 +73,9 @@ def test_block_that_allocates_arrays_frees_them(living):
     part = Block("squares", Squares(7), Cell(Last(np.zeros(7), 0)), (), (SUM,))
     graph = graph_of(part)
     graph.advance(10)
-    held = living()
+    allocated = living()
     graph.advance(TICKS)
-    assert living() == held
+    assert living() == allocated
     assert graph.latest("sum", TICKS - 1).number == 91.0
     assert read(part.state).ticks.tolist() == [0.0, 1.0, 4.0, 9.0, 16.0, 25.0, 36.0]
     assert counts(Squares) == [True]

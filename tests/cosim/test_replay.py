@@ -187,7 +187,7 @@ class Terminal:
     """Clock that only advances while waiting, and keys typed at given times."""
 
     def __init__(self, typed):
-        self.now, self.typed, self.said = 0.0, dict(typed), []
+        self.now, self.typed, self.printed = 0.0, dict(typed), []
 
     def keys(self):
         due = [at for at in self.typed if at <= self.now]
@@ -198,7 +198,7 @@ class Terminal:
 
     def went(self, messages):
         """Return the wall time of each message (due [s], time [ns])."""
-        pace, result = Pace(self.keys, self.said.append, self.wait, lambda: self.now), []
+        pace, result = Pace(self.keys, self.printed.append, self.wait, lambda: self.now), []
         for due, time_ns in messages:
             pace.wait(due, time_ns, lambda: self.now > 100.0)
             if pace.quit or self.now > 100.0:
@@ -213,7 +213,7 @@ def test_messages_after_pause_keep_their_distance():
     assert went[:2] == pytest.approx([0.0, 1.0], abs=0.03)
     assert went[2] == pytest.approx(6.0, abs=0.03)
     assert np.diff(went[2:]) == pytest.approx([1.0, 1.0], abs=0.03)
-    assert [line.split()[0] for line in terminal.said] == ["paused", "resumed"]
+    assert [line.split()[0] for line in terminal.printed] == ["paused", "resumed"]
 
 
 def test_step_publishes_all_messages_of_one_instant():

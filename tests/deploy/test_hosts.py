@@ -47,7 +47,7 @@ def test_two_hosts_share_endpoints_and_run_each_service_once():
             assert {MONITOR, *process_table.required_processes(setup)} <= set(tables[0])
 
 
-def test_services_of_two_hosts_use_their_own_certificates():
+def test_service_of_two_hosts_has_certificate_of_its_name():
     for address, services in (("10.0.0.1", composed("dynamics.yml")), ("10.0.0.2", composed("flight.yml"))):
         for name, service in services.items():
             assert service["command"][2] == name or name == MONITOR

@@ -93,9 +93,9 @@ def _continues(command: list[str], environment: dict[str, str], out: Path) -> li
     """Return the problems of running the same command again."""
     again = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, timeout=LONGEST)
     if (again.returncode, again.stderr) != (0, ""):
-        return [f"does not go on: exit code {again.returncode}: {again.stderr!r}"]
+        return [f"does not continue: exit code {again.returncode}: {again.stderr!r}"]
     result, expected = _digest(again.stdout), undisturbed()
-    return [] if result == expected else [f"digest {result} when it has gone on, expected {expected}"]
+    return [] if result == expected else [f"digest {result} after continuation, expected {expected}"]
 
 
 @cache

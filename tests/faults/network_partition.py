@@ -29,7 +29,7 @@ def fly(victim: str, kind: str, delay: float, folder: Path) -> tuple[int, str, f
     sets = ["run.duration=5", "success.require=[]"]
     with Network(HOSTS) as network, Run(network, {name: name for name in HOSTS}, sets, folder / "keys", folder) as run:
         if not run.flies():
-            return 1, "", 0.0, ["it did not begin"]
+            return 1, "", 0.0, ["the run did not begin"]
         time.sleep(delay)
         over = run.participants["recorder"].poll() is not None
         network.cut_off = {victim}
@@ -47,7 +47,7 @@ def fly(victim: str, kind: str, delay: float, folder: Path) -> tuple[int, str, f
     elif code == 1:
         named = output.partition(": ")[2].partition(": ")[0].split(", ")
         if named != ([victim] if victim != MONITOR else sorted(set(HOSTS) - {MONITOR})):
-            wrong.append(f"names the wrong: {output}")
+            wrong.append(f"names the wrong participants: {output}")
     elif code:
         wrong.append(f"exit code {code}: {output}")
     if (stated := output.partition("at t = ")[2]) and victim != "recorder":  # the others continue without it

@@ -39,7 +39,7 @@ def test_fault_ends_run_as_specified(trial):
     assert not outcome.wrong, outcome
 
 
-def test_seed_makes_same_trial():
+def test_trial_depends_on_seed_only():
     assert draw(7) == draw(7)
     assert len({draw(seed).kind for seed in range(40)}) >= 4
     assert draw(7, [campaign.KILL]).scene == "hover"

@@ -29,17 +29,17 @@ _SENDER = bytes([255, 190])  # system and component of a ground station
 def _conversations() -> Callable[[bytes], None]:
     """Return a function that sends bytes to a vehicle from consecutive endpoints; each starts with an estimate."""
     adapter = Adapter(describe(scene_resolver.load("hover")), lambda command: None)
-    now = SimpleNamespace(endpoint=None, count=0)
+    state = SimpleNamespace(endpoint=None, count=0)
 
     def read(data: bytes) -> None:
-        if now.count % CONVERSATION == 0:
-            if now.endpoint:
-                adapter.disconnect(now.endpoint)
-            time_ns = now.count // CONVERSATION * STEP
+        if state.count % CONVERSATION == 0:
+            if state.endpoint:
+                adapter.disconnect(state.endpoint)
+            time_ns = state.count // CONVERSATION * STEP
             adapter.handle(ESTIMATE, time_ns, Estimate(header(time_ns, "world")).encode(), time_ns * 1e-9)
-            now.endpoint = adapter.connect(True, True, lambda sent: None)
-        now.count += 1
-        adapter.receive(now.endpoint, data)
+            state.endpoint = adapter.connect(True, True, lambda sent: None)
+        state.count += 1
+        adapter.receive(state.endpoint, data)
 
     return read
 
@@ -125,16 +125,16 @@ def websocket() -> Target:
     Short frames are padded, so that the server reads them and a connection serves many inputs.
     """
     server = _server()
-    now = SimpleNamespace(client=Client(server.port))
+    state = SimpleNamespace(client=Client(server.port))
 
     def read(data: bytes) -> None:
         missing = _missing(data)
         if missing > MOST:
-            now.client.end(data)
-        elif now.client.outlives(data + bytes(missing)):
+            state.client.end(data)
+        elif state.client.outlives(data + bytes(missing)):
             return
-        now.client.close()
-        now.client = Client(server.port)
+        state.client.close()
+        state.client = Client(server.port)
 
     frames = [bytes([0x81, 0x80 | len(text), *bytes(4)]) + text for text in _TEXTS]
     return Target(read, (*frames, bytes([0x82, 0x80 | len(_BINARY), *bytes(4)]) + _BINARY))
@@ -143,15 +143,15 @@ def websocket() -> Target:
 def requests() -> Target:
     """Payloads in valid frames, so that the server reads all of them; the first byte selects the kind."""
     server = _server()
-    now = SimpleNamespace(client=Client(server.port), sent=0)
+    state = SimpleNamespace(client=Client(server.port), sent=0)
 
     def read(data: bytes) -> None:
         kind, output = 0x82, data[1:]
         if data[:1] < b"\x80":  # invalid UTF-8 closes the connection: `websocket` sends such texts
             kind, output = 0x81, output.decode(errors="replace").encode()
-        now.client.send(bytes([kind, 0xFE]) + len(output).to_bytes(2, "big") + bytes(4) + output)
-        now.sent += 1
-        if now.sent % UNANSWERED == 0 and not now.client.outlives(b""):
+        state.client.send(bytes([kind, 0xFE]) + len(output).to_bytes(2, "big") + bytes(4) + output)
+        state.sent += 1
+        if state.sent % UNANSWERED == 0 and not state.client.outlives(b""):
             raise ConnectionError("the server does not answer")
 
     return Target(read, (*(b"\0" + text for text in _TEXTS), b"\xff" + _BINARY))

@@ -12,7 +12,7 @@ def weighted(k, x, y):
 
 
 @always_inline
-def taken(x, y, i):
+def item_difference(x, y, i):
     return x[i] - y[i]
 
 
@@ -24,7 +24,7 @@ def first(x):
 
 @kernel
 def all_of(x, y):
-    return map_tuple(weighted, 2.0, x, y), map_index(taken, x, x, y), first(x), first(x[1])
+    return map_tuple(weighted, 2.0, x, y), map_index(item_difference, x, x, y), first(x), first(x[1])
 
 
 def test_source_may_have_several_lines():

@@ -21,7 +21,7 @@ def test_module_and_its_imports_are_found_in_scene_folder(tmp_path):
     assert result["own_helper"] == tmp_path / "own_helper.py"
 
 
-def test_module_is_found_on_pythons_path(tmp_path, monkeypatch):
+def test_module_is_found_on_python_path(tmp_path, monkeypatch):
     (tmp_path / "own_elsewhere.py").write_text("x = 1")
     monkeypatch.syspath_prepend(tmp_path)
     assert find("key", "own_elsewhere", tmp_path / "scenes") == {"own_elsewhere": tmp_path / "own_elsewhere.py"}

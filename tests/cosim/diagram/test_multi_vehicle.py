@@ -81,7 +81,7 @@ def test_vehicle_and_path_start_at_initial_position(flown):
     assert flown.view("scout/estimate").position[0, :2] == pytest.approx((-3.0, 0.0), abs=0.1)
 
 
-def test_diagram_per_service_gives_equal_results(setup, flown):
+def test_separate_diagrams_have_equal_results(setup, flown):
     apart = fly_apart(setup, None)
     assert apart.topics.keys() == flown.topics.keys()
     assert apart.digest == flown.digest

@@ -46,7 +46,7 @@ def test_compiled_and_python_rule_agree():
         (7, LATCHED, 3, 4),
     ],
 )
-def test_examples(tick, period, delay, stamp):
+def test_due_stamp_of_examples(tick, period, delay, stamp):
     assert due.py_func(tick, period, delay) == stamp
 
 
@@ -69,7 +69,7 @@ def test_execution_order_is_independent_of_naming_order():
     assert order(dict(reversed(loop.items())), dict(reversed(GIVES.items()))) == order(loop, GIVES)
 
 
-def test_own_port_as_input_is_no_loop():
+def test_own_output_as_input_is_no_loop():
     assert order({"plant": [("truth",)]}, {"plant": ["truth"]}) == ["plant"]
 
 

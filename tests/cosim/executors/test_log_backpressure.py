@@ -26,16 +26,16 @@ class Bus:
     """Bus that returns its own messages."""
 
     def __init__(self):
-        self.said = []
+        self.sent = []
 
     def publisher(self, key):
-        return lambda payload, time_ns: self.said.append(payload)
+        return lambda payload, time_ns: self.sent.append(payload)
 
     def receive(self, senders):
         return self
 
     def get(self, timeout):
-        return (0, self.said.pop(0)) if self.said else None
+        return (0, self.sent.pop(0)) if self.sent else None
 
 
 class Process:
@@ -54,27 +54,27 @@ class Process:
 
 def test_run_waits_while_log_is_behind():
     process = Process()
-    held, teller = LogBackpressure(process, "recorder"), LogProgressPublisher(process.bus, "test", "recorder")
+    pressure, progress = LogBackpressure(process, "recorder"), LogProgressPublisher(process.bus, "test", "recorder")
     for tick in range(0, 10 * AHEAD, LOOK):  # without a recorder
-        held.wait_for_log(tick)
+        pressure.wait_for_log(tick)
     assert process.waits == []
-    teller.recorded(0)
-    held.wait_for_log(AHEAD - LOOK)
+    progress.recorded(0)
+    pressure.wait_for_log(AHEAD - LOOK)
     assert process.waits == []
-    held.wait_for_log(AHEAD)
+    pressure.wait_for_log(AHEAD)
     assert process.waits == ["the log, recorded up to tick 0"]
-    held.wait_for_log(AHEAD + 6144)
+    pressure.wait_for_log(AHEAD + 6144)
     assert process.waits[1:] == ["the log, recorded up to tick 3000", "the log, recorded up to tick 6000"]
 
 
 @pytest.mark.parametrize(("vehicles", "ahead"), [(1, AHEAD), (2, AHEAD // 2), (50, LEAST)])
 def test_allowed_lead_over_log_shrinks_with_vehicles(vehicles, ahead):
     process = Process(vehicles)
-    held, teller = LogBackpressure(process, "recorder"), LogProgressPublisher(process.bus, "test", "recorder")
-    teller.recorded(0)
-    held.wait_for_log(ahead - LOOK)
+    pressure, progress = LogBackpressure(process, "recorder"), LogProgressPublisher(process.bus, "test", "recorder")
+    progress.recorded(0)
+    pressure.wait_for_log(ahead - LOOK)
     assert process.waits == []
-    held.wait_for_log(ahead)
+    pressure.wait_for_log(ahead)
     assert process.waits
 
 
@@ -84,11 +84,11 @@ def test_allowed_lead_covers_unrecorded_ticks():
 
 def test_progress_reports_waiting_for_disk():
     bus = Bus()
-    teller = LogProgressPublisher(bus, "test", "recorder")
-    teller.recorded(7)
-    teller.waiting()
-    assert [waits_for_disk(payload) for payload in bus.said] == [False, True]
-    assert log_backpressure._PROGRESS.unpack(bus.said[1])[0] == 7
+    progress = LogProgressPublisher(bus, "test", "recorder")
+    progress.recorded(7)
+    progress.waiting()
+    assert [waits_for_disk(payload) for payload in bus.sent] == [False, True]
+    assert log_backpressure._PROGRESS.unpack(bus.sent[1])[0] == 7
 
 
 def test_slow_disk_is_reported_and_one_chunk_is_buffered(tmp_path, monkeypatch):

@@ -93,6 +93,6 @@ def test_packet_schedules_have_unique_keys():
 
 def test_battery_has_separate_packets():
     setup = resolve(load("delivery_mission"))
-    taken = packet_schedule(setup, "plant", "autopilot")
-    assert [port.name for port in taken.ports(setup.services["plant"].ports)] == ["battery"]
+    schedule = packet_schedule(setup, "plant", "autopilot")
+    assert [port.name for port in schedule.ports(setup.services["plant"].ports)] == ["battery"]
     assert packet_schedule(setup, "plant", "sensors") == EACH_TICK

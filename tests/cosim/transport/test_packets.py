@@ -59,21 +59,21 @@ def filled(tick):
 
 @pytest.mark.parametrize(("tick", "numbers"), [(0, 6), (3, 2), (5, 4), (10, 6)])
 def test_step_packet_holds_due_rows_in_order(tick, numbers):
-    bundles, giver, taker = StepPacketCodec(PORTS), filled(tick), graph("slower", "pair", "slow")
-    payload = bundles.pack(giver, tick)
+    codec, producer, consumer = StepPacketCodec(PORTS), filled(tick), graph("slower", "pair", "slow")
+    payload = codec.pack(producer, tick)
     expected = [tick + 0.5, -float(tick), tick + 0.5, 1.0, tick + 0.5, -float(tick)][:numbers]
     assert np.frombuffer(payload, "<f8").tolist() == expected
-    bundles.unpack(payload, taker, tick)
+    codec.unpack(payload, consumer, tick)
     for port in PORTS:
         if tick % port.period == 0:
-            assert taker.latest(port.name, tick) == giver.latest(port.name, tick)
+            assert consumer.latest(port.name, tick) == producer.latest(port.name, tick)
 
 
 def test_diagram_stores_ports_in_use_only():
-    taker = graph("slow")
-    StepPacketCodec(PORTS).unpack(StepPacketCodec(PORTS).pack(filled(10), 10), taker, 10)
-    assert taker.latest("slow", 10) == Single(10.5, True)
-    assert not taker.has("pair")
+    consumer = graph("slow")
+    StepPacketCodec(PORTS).unpack(StepPacketCodec(PORTS).pack(filled(10), 10), consumer, 10)
+    assert consumer.latest("slow", 10) == Single(10.5, True)
+    assert not consumer.has("pair")
 
 
 def test_service_without_due_port_has_no_packet():
@@ -93,17 +93,17 @@ def run_of(ticks):
 
 @pytest.mark.parametrize("ticks", [2, 3, 4, 7, 12])
 def test_packet_of_several_ticks_equals_single_packets(ticks):
-    giver, one_by_one, at_once = run_of(15), graph("pair", "slow"), graph("pair", "slow")
+    producer, one_by_one, at_once = run_of(15), graph("pair", "slow"), graph("pair", "slow")
     for ports in (PORTS, PORTS[1:]):
         single, several = StepPacketCodec(ports), StepPacketCodec(ports, ticks)
         for first in range(0, 15 - ticks, ticks):
             each = [tick for tick in range(first, first + ticks) if single.due(tick)]
             assert several.due(first) == bool(each)
             for tick in each:
-                single.unpack(single.pack(giver, tick), one_by_one, tick)
+                single.unpack(single.pack(producer, tick), one_by_one, tick)
             if each:
-                payload = several.pack(giver, first)
-                assert len(payload) == sum(len(single.pack(giver, tick)) for tick in each)
+                payload = several.pack(producer, first)
+                assert len(payload) == sum(len(single.pack(producer, tick)) for tick in each)
                 several.unpack(payload, at_once, first)
         for port in ports[:-1]:
             for tick in range(0, first + ticks, port.period):
