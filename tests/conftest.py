@@ -25,7 +25,7 @@ hypothesis.settings.load_profile("lapwing")
 
 
 def pytest_configure(config: pytest.Config) -> None:
-    """Before any worker has ended."""
+    """Prepare the peaks before any worker ends."""
     config.stash[_peaks] = {}
 
 
@@ -36,7 +36,7 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 
 
 def pytest_sessionfinish(session: pytest.Session) -> None:
-    """A worker hands its figure over."""
+    """Send the peak memory of a worker to the controlling process."""
     peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024.0  # in kB on Linux
     if hasattr(session.config, "workeroutput"):
         session.config.workeroutput[_PEAK] = peak
@@ -46,12 +46,12 @@ def pytest_sessionfinish(session: pytest.Session) -> None:
 
 @pytest.hookimpl(optionalhook=True)
 def pytest_testnodedown(node) -> None:
-    """One that has crashed has none."""
+    """Store the peak memory of a worker; a crashed worker sent none."""
     if result := getattr(node, "workeroutput", {}).get(_PEAK):
         node.config.stash[_peaks][node.gateway.id] = result
 
 
 def pytest_terminal_summary(terminalreporter) -> None:
-    """One line."""
+    """Print the peak memory of each process."""
     peaks = terminalreporter.config.stash[_peaks]
     terminalreporter.write_line(f"peak memory: {', '.join(f'{k} {v:.0f} MB' for k, v in sorted(peaks.items()))}")

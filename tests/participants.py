@@ -1,4 +1,4 @@
-"""The processes of a run, found from outside by what the system calls them."""
+"""Processes of a run, found by their names in /proc."""
 
 from contextlib import suppress
 from pathlib import Path
@@ -7,7 +7,7 @@ from lapwing.services.process_table import PROCESSES
 
 
 def participants(launcher):
-    """Process numbers of a launcher's children that take part, by name."""
+    """Return the process ids of a launcher's participants, by name."""
     names = {process.name for process in PROCESSES}
     result = {}
     with suppress(OSError):
@@ -20,7 +20,7 @@ def participants(launcher):
 
 
 def running(process):
-    """Return whether a process runs; one that ended and waits for its parent does not."""
+    """Return True if a process runs and is not a zombie."""
     try:
         return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:

@@ -1,4 +1,4 @@
-"""docker-compose.yml, without Docker: sound, and on this machine its commands make a vehicle and fly a campaign."""
+"""docker-compose.yml without Docker: the file is valid, and its commands fly a vehicle and a campaign here."""
 
 import math
 import re
@@ -34,7 +34,7 @@ SET = {"SCENE": "lapwing/scenes/groundstation.toml", "SPEED": "2"}
 
 
 def compose(**inputs):
-    """The services of the file, its variables set."""
+    """Return the services of the file with its variables substituted."""
     text = (ROOT / "docker-compose.yml").read_text()
     text = re.sub(r"\$\{(\w+):-([^}]*)\}", lambda m: (SET | inputs).get(m[1], m[2]), text)
     return yaml.safe_load(text)["services"]
@@ -42,7 +42,7 @@ def compose(**inputs):
 
 @contextmanager
 def ended():
-    """A list of processes, which are ended at last."""
+    """Yield a list; terminate the processes in it at the end."""
     running = []
     try:
         yield running
@@ -73,9 +73,9 @@ def test_compose_services_have_known_commands():
 
 def test_profile_starts_exactly_its_dependencies():
     services = compose()
-    assert "profiles" not in services.pop("keys")  # docker-compose 1.29 finds what others need only so
+    assert "profiles" not in services.pop("keys")  # otherwise docker-compose 1.29 does not find it
     for name, service in services.items():
-        assert service["profiles"], name  # one without starts with every profile
+        assert service["profiles"], name  # a service without profiles starts with every profile
         for needed in {*service.get("depends_on", ())} - {"keys"}:
             assert set(service["profiles"]) <= set(services[needed]["profiles"]), f"{name} needs {needed}"
     profiles = ("cluster", "mission", "groundstation", "view")
@@ -96,7 +96,7 @@ def test_every_image_is_stage_of_dockerfile():
 
 
 def own_certificates(services):
-    """The participant whose certificate each service that takes part in a flight needs."""
+    """Return the participant whose certificate each service of a flight needs, by service."""
     taking_part = {
         name: service["command"] for name, service in services.items() if "--endpoints" in service["command"]
     }
@@ -132,7 +132,7 @@ def test_container_links_are_certified_by_default():
         k = command.index("--endpoints") + 1
         assert command[k + 1] == "--keys=keys"
         assert {endpoint.partition("/")[0] for endpoint in parse_endpoints(command[k]).values()} == {"tls"}
-        # of what nobody but this host reaches: MAVLink's ports, and Foxglove's
+        # only this host can reach the ports of MAVLink and Foxglove
         assert ("--insecure" in command) == (name in ("groundstation", "foxglove"))
         if "--listen" in command:
             assert command[command.index("--listen") + 1].startswith("tls/")
@@ -140,7 +140,7 @@ def test_container_links_are_certified_by_default():
         assert {endpoint.partition("/")[0] for endpoint in parse_endpoints(insecure[k]).values()} == {"tcp"}
 
 
-def test_containers_are_closed():
+def test_containers_have_least_privileges():
     for name, service in compose().items():
         assert service["cap_drop"] == ["ALL"], name
         assert service["security_opt"] == ["no-new-privileges:true"], name
@@ -149,7 +149,7 @@ def test_containers_are_closed():
         assert service.get("network_mode", "none") == "none", name
         assert service["read_only"], name
         assert {"mem_limit", "pids_limit", "healthcheck"} <= {*service}, name
-        # who starts as root has what it takes to become another, or to give to others (deploy/entrypoint.sh, keys.sh)
+        # a container that starts as root may change its user or give files to others (deploy/entrypoint.sh, keys.sh)
         added = ["SETGID", "SETPCAP", "SETUID"] if name in ("mission", "recorder", "campaign", *FIRMWARES) else []
         added = ["CHOWN"] if name == "keys" else added
         assert service.get("cap_add", []) == added, name
@@ -157,7 +157,7 @@ def test_containers_are_closed():
 
 
 def endpoints():
-    """The names in the table of participants, and who is started by `docker compose up mission`."""
+    """Return the endpoints of the participants, and the services that `docker compose up mission` starts."""
     mission = compose()["mission"]
     table = mission["command"][mission["command"].index("--endpoints") + 1]
     return parse_endpoints(table), {"mission", *mission["depends_on"]} - {"keys"}
@@ -174,7 +174,7 @@ def test_required_processes_have_container_and_endpoint(scene):
     assert needed <= started
 
 
-def test_every_process_of_table_has_endpoint():
+def test_every_process_has_endpoint():
     peers, _ = endpoints()
     one_container = {processes.FMU, *FIRMWARES}  # foreign code is flown inside one container
     assert {entry.name for entry in processes.PROCESSES} - one_container <= set(peers)
@@ -184,7 +184,7 @@ def test_cluster_flies_campaign(tmp_path):
     pytest.importorskip("distributed", reason="Dask is not installed: pip install lapwing[cluster]")
     services, port = compose(), str(free_port())
 
-    def begun(name, *more):
+    def start(name, *more):
         words = [word.replace("scheduler:8786", f"127.0.0.1:{port}") for word in services[name]["command"]]
         words = [port if word == "8786" else word.replace("recordings/", f"{tmp_path}/") for word in words]
         other = {"/tmp": str(tmp_path), SET["SCENE"]: "lapwing/scenes/hover.toml"}
@@ -194,9 +194,9 @@ def test_cluster_flies_campaign(tmp_path):
             return subprocess.Popen([*program, *more], cwd=ROOT, stdout=output, stderr=subprocess.STDOUT)
 
     with ended() as helpers:
-        helpers.append(begun("scheduler"))
-        helpers.append(begun("worker"))
-        flights = begun("campaign", "--set", "run.duration=1", "--runs", "4")
+        helpers.append(start("scheduler"))
+        helpers.append(start("worker"))
+        flights = start("campaign", "--set", "run.duration=1", "--runs", "4")
         assert flights.wait(PATIENCE) == 0, (tmp_path / "campaign.txt").read_text()
         assert "4 runs" in (tmp_path / "campaign.txt").read_text()
         assert (tmp_path / "campaign" / "report.html").exists()
@@ -205,11 +205,11 @@ def test_cluster_flies_campaign(tmp_path):
 
 @contextmanager
 def flying(services, name, folder, *more):
-    """The processes of the containers that `name` needs, by name, and the ports here for theirs; `more` for each."""
+    """Yield the processes of the containers that `name` needs, and the local ports; append `more` to each command."""
     ports = {}
 
     def here(word):
-        """A container's addresses as some of this machine."""
+        """Replace the addresses of containers by local ones."""
         kind = socket.SOCK_DGRAM if word.startswith("udp") else socket.SOCK_STREAM
         addresses = r"(?<=/)[a-z0-9]+:7447|0\.0\.0\.0:\d+"
         word = re.sub(addresses, lambda m: f"127.0.0.1:{ports.setdefault(m[0], free_port(kind))}", word)
@@ -243,7 +243,7 @@ def test_viewer_with_certificate_receives_flight_and_events(tmp_path):
     assert seen[1] > 0
 
 
-def test_groundstations_services_fly_as_separate_processes(tmp_path):
+def test_groundstation_services_fly_as_separate_processes(tmp_path):
     services = compose(SCHEME="tcp", LINKS="--insecure")
     with flying(services, "groundstation", tmp_path) as (running, ports):
         port = ports["0.0.0.0:5760"]
@@ -277,7 +277,7 @@ def test_groundstations_services_fly_as_separate_processes(tmp_path):
 
 
 @pytest.mark.parametrize("firmware", FIRMWARES)
-def test_firmware_profile_starts_program_of_its_mount(firmware):
+def test_firmware_profile_starts_mounted_program(firmware):
     service = compose(SCENE=f"{firmware}_quad")[firmware]
     mount = next(v for v in service["volumes"] if ":/opt/" in v)
     host, target, mode = mount.split(":")

@@ -1,4 +1,4 @@
-"""Package data that is not Python is declared; `make` shows the steps of its set-up."""
+"""Package data is declared; `make` prints the steps of its set-up."""
 
 import shutil
 import subprocess
@@ -27,7 +27,7 @@ def test_package_data_covers_shipped_kernels():
 
 
 @pytest.mark.skipif(shutil.which("make") is None, reason="needs make")
-def test_set_up_shows_its_steps_and_guesses_no_time(tmp_path):
+def test_make_prints_set_up_steps_without_durations(tmp_path):
     command = ["make", "--dry-run", "mission", f"VENV={tmp_path}/venv"]
     lines = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     assert "-m pip install" in lines

@@ -26,7 +26,7 @@ FLOWN = [c for c in COMMANDS if c.startswith("lapwing ")]
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """A folder that looks like a checkout to its user."""
+    """Return a folder with the scenes and the recordings folder of a checkout."""
     path = tmp_path_factory.mktemp("checkout")
     (path / "lapwing").mkdir()
     (path / "lapwing/scenes").symlink_to(ROOT / "lapwing/scenes")
@@ -36,7 +36,7 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def begun(folder, request):
-    """The commands that are asked for, as many at a time as there are cores, each with what it will end with."""
+    """Run the selected commands, one per core at a time; yield the future result of each."""
     names = {item.callspec.params["command"] for item in request.session.items if _is_flown(item)}
     result: dict[str, Future] = {}
     pool = ThreadPoolExecutor(os.cpu_count())
@@ -52,15 +52,15 @@ def _is_flown(item):
 
 
 def _written(command):
-    """The logs that a command writes."""
+    """Return the logs that a command writes."""
     words = shlex.split(command)
     return {log for option, log in pairwise(words) if option == "--log"}
 
 
 def _run(command, key_prefix, folder, before):
-    """Run a command once those before it, which began earlier, have written what it reads.
+    """Run a command after the commands that write its input.
 
-    Videos have a picture per second instead of twenty: all pictures of a flight take the same path through the code.
+    Videos have one picture per second instead of twenty: all pictures of a flight test the same code.
     """
     for one in before:
         one.result()

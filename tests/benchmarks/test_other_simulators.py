@@ -1,4 +1,4 @@
-"""Other simulators on the stability cases: the rows that they measure, and missing packages."""
+"""Stability cases in other simulators: measured rows, and missing packages."""
 
 from types import SimpleNamespace
 

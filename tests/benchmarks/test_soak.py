@@ -6,7 +6,7 @@ from benchmarks.soak import Sample, rows
 
 
 def samples(slower, dearer):
-    """40 of a flight that is `slower` in its last quarter, and whose simulated seconds are `dearer` there."""
+    """Return 41 samples; in the last quarter, wall time is `slower` and processor time `dearer` by these factors."""
     result, wall, processor = [], 0.0, 0.0
     for k in range(41):
         result.append(Sample(wall, float(k), 1000.0, 90, 40, processor, 0.15 * k))

@@ -27,7 +27,7 @@ def undefined_symbols(code: bytes) -> set[str]:
 
 
 def _object_code(library: Any) -> bytes:
-    """Return what was kept of a library, or would be."""
+    """Return the object code of a library, as the cache stores it."""
     if library._compiled_object is not None:
         return library._compiled_object
     return library.codegen._tm.emit_object(library._get_module_for_linking())

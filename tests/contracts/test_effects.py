@@ -26,7 +26,7 @@ EULER, RK4 = get("lie_euler").Method(), get("rk4_renormalised").Method()
 KEY = stream_key(1, "drone1", "effects")
 HOVER = (32.6, 32.5, 32.7, 32.6)
 
-NEEDED = {  # the keys that a scene cannot leave out
+NEEDED = {  # required keys
     "ceiling_effect": {"height": 12.0},
     "rotor_quadratic": {"thrust_constant": 2.2e-4, "torque_constant": 8.6e-6},
     "rotational_drag": {"linear": [0.1, 0.1, 0.1]},
@@ -40,7 +40,7 @@ NEEDED = {  # the keys that a scene cannot leave out
     "wind_boundary_layer": {"speed": 5.0},
     "wind_gust": {"peak": [3.0, 0.0, 0.0], "start": 0.0, "duration": 1.0},
 }
-OTHERS = (  # of which another is among them
+OTHERS = (  # excluded by another effect of `ALL`
     "battery_thevenin", "coaxial_interference", "gravity", "ground_effect", "dynamic_inflow", "rotor_interference",
     "rotor_quadratic", "rotor_table", "wind_dryden_rates", "wind_von_karman",
 )  # fmt: skip
@@ -51,23 +51,23 @@ COAXIAL = DRONE.model_copy(
         )
     }
 )
-FRAMES = {"coaxial_interference": COAXIAL}  # of effects that the drone cannot have
+FRAMES = {"coaxial_interference": COAXIAL}  # for effects that do not fit the drone
 BESIDE = {
     name: {"rotor_thrust": {}} for name in ("coaxial_interference", "rotor_interference")
-}  # what an effect goes with
+}  # effects that an effect needs
 FREE = {**NEEDED, "random_wind_force": {"allow_body_drag": True}}
 ALL = {name: FREE.get(name, {}) for name in effects.names() if name not in OTHERS}
 
 
 def made(name, table):
-    """The effect, on a vehicle that can have it."""
+    """Return the effect, on a vehicle that can have it."""
     result = effects.from_scene({**BESIDE.get(name, {}), name: table}, FRAMES.get(name, DRONE))
     return next(e for e in result if type(e) is effects.parameter_class(name))
 
 
 @pytest.mark.parametrize("name", effects.names())
-def test_is_documented(name):
-    """Equation, source, validity and units, and the equation stands in the theory."""
+def test_effect_docstring_has_range_and_equation(name):
+    """The docstring has the range of validity and an equation of theory.md."""
     text = effects.parameter_class(name).__doc__
     assert "Valid" in text
     equation = re.search(r"theory\.md,\s+eq\.\s+(\(\d+\.\d+\))", text).group(1)
@@ -75,12 +75,12 @@ def test_is_documented(name):
 
 
 @pytest.mark.parametrize("name", effects.names())
-def test_registers_hook(name):
+def test_effect_registers_hook(name):
     assert any(effects.parameter_class(name) in registered for registered in hooks.HOOKS.values())
 
 
 @pytest.mark.parametrize("name", effects.names())
-def test_is_built_from_scene_and_refuses_unknown_keys(name):
+def test_scene_table_creates_effect_and_rejects_unknown_keys(name):
     assert isinstance(hooks.initial_discrete_state(made(name, NEEDED.get(name, {}))), tuple)
     with pytest.raises(ValueError, match=rf"^effects\.{name}\.nonsense: ") as error:
         made(name, {**NEEDED.get(name, {}), "nonsense": 1.0})
@@ -88,13 +88,13 @@ def test_is_built_from_scene_and_refuses_unknown_keys(name):
 
 
 @pytest.mark.parametrize("name", NEEDED)
-def test_names_key_that_is_missing(name):
+def test_missing_key_is_named(name):
     with pytest.raises(ValueError, match=rf"^effects\.{name}\.{next(iter(NEEDED[name]))}: missing; expected"):
         effects.from_scene({name: {}}, DRONE)
 
 
 def numbers(name):
-    """(key, how many numbers it holds) of an effect's table."""
+    """Yield (key, count of numbers, 0 for a scalar) of the numeric keys in an effect's table."""
     settings = getattr(effects.get(name), "Settings", effects.parameter_class(name))
     for key, hint in get_type_hints(settings).items():
         kinds = [hint, *get_args(hint)]
@@ -107,7 +107,7 @@ def numbers(name):
     ("name", "key", "count"), [(name, *entry) for name in effects.names() for entry in numbers(name)]
 )
 @pytest.mark.parametrize("value", [-1e12, 1e12])
-def test_names_key_that_is_out_of_range(name, key, count, value):
+def test_out_of_range_key_is_named(name, key, count, value):
     if value > 0.0 and key in ("release_time", "start", "duration", "time"):
         pytest.skip("a time may be as late as one likes")
     table = {**NEEDED.get(name, {}), key: [value] * count if count else value}
@@ -135,7 +135,7 @@ def test_unknown_effect_lists_choices():
         effects.from_scene({"gravitation": {}}, DRONE)
 
 
-def test_two_of_kind_exclude_each_other():
+def test_effects_of_equal_kind_exclude_each_other():
     with pytest.raises(ValueError, match=r"effects.gravity_altitude: excludes effects.gravity, both are a gravity"):
         effects.from_scene({"gravity": {}, "gravity_altitude": {}}, DRONE)
 
@@ -157,14 +157,14 @@ def test_all_effects_at_once_fly():
     assert [len(memory) > 0 for memory in state.memory].count(True) >= 6
 
 
-def test_order_of_scenes_tables_does_not_matter():
+def test_effects_are_independent_of_table_order():
     one = effects.from_scene(ALL, DRONE)
     assert one == effects.from_scene(dict(reversed(ALL.items())), DRONE)
 
 
 @always_inline
 def bare_rate(p, t, m):
-    """Gravity, thrust and lag written by hand, from the same constants."""
+    """Return gravity, thrust and lag, written by hand with the same constants."""
     layout, w = p.layout, m.rotor_speed
     b = p.effects[1].thrust_constant * STANDARD_DENSITY
     d = p.effects[1].torque_constant * STANDARD_DENSITY
@@ -195,8 +195,8 @@ def bare_steps(p, m, h, n):
 
 
 @pytest.mark.long
-def test_effects_that_are_off_leave_every_bit():
-    """The plant with the whole catalogue installed against a kernel that knows of no effects at all."""
+def test_absent_effects_change_no_bit():
+    """Compare the plant, with all effects installed, with a kernel without the machinery of effects."""
     state = fly({"gravity": {}, "rotor_thrust": {}}, RK4)
     p = multirotor.parameters(DRONE, effects.from_scene({"gravity": {}, "rotor_thrust": {}}, DRONE))
     start = multirotor.initial_state(p, (0.0, 0.0, 20.0), rotor_speed=330.0)
@@ -204,8 +204,8 @@ def test_effects_that_are_off_leave_every_bit():
     assert not math.isclose(state.motion.omega_body[0], 0.0)
 
 
-def test_step_takes_about_as_long_as_one_written_by_hand():
-    """Processor time of the plant's step to that of the loop above, the least of many short runs in turn."""
+def test_step_takes_time_of_hand_written_step():
+    """Compare the processor time with that of the loop above, as minima over alternating short runs."""
     p = multirotor.parameters(DRONE, effects.from_scene({"gravity": {}, "rotor_thrust": {}}, DRONE))
     start, steps = multirotor.initial_state(p, (0.0, 0.0, 20.0), rotor_speed=330.0), 10_000
     runs = (
@@ -224,5 +224,5 @@ def test_step_takes_about_as_long_as_one_written_by_hand():
 
 @pytest.mark.long
 def test_disabled_effect_changes_no_bit():
-    """High above the ground the contact changes nothing."""
+    """Fly high above the ground, where contact has no effect."""
     assert fly({"gravity": {}, "ground_contact": {}}, RK4).motion == fly({"gravity": {}}, RK4).motion

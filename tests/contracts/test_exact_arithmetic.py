@@ -1,7 +1,7 @@
-"""Same bits on every machine: the C library, BLAS, LAPACK and numpy's SIMD loops compute no number of a digest.
+"""Equal digests on all machines: no number comes from the C library, BLAS, LAPACK or SIMD loops of numpy.
 
-Object code of kernels imports no function of the C library that rounds. Sources of the engine, of the dynamics and of
-the services in lock step, which also compute parameters in plain Python, call none either.
+The object code of kernels imports no function of the C library that rounds. The sources of the engine, the dynamics and
+the lock-step services do not call one either, because they also compute parameters in plain Python.
 """
 
 import ast
@@ -49,7 +49,7 @@ ROUNDED_BY_NUMPY = ROUNDED_BY_LIBRARY | {
     "linalg", "logspace", "matmul", "polyfit", "power", "tensordot", "vdot",
 }  # fmt: skip
 PREFIXES = ("NRT_", "Py", "_Py", "numba_", "mem", "_ZN")
-EXACT = {"ceil", "floor", "fmod", "nearbyint", "rint", "trunc"}  # without SSE 4.1 the processor has no instruction
+EXACT = {"ceil", "floor", "fmod", "nearbyint", "rint", "trunc"}  # called on processors without SSE 4.1
 
 
 def _sources():
@@ -58,7 +58,7 @@ def _sources():
 
 
 def _modules(tree):
-    """Names by which a source calls Python's math and numpy."""
+    """Return the names of Python's math and of numpy in a source."""
     names = {}
     for node in ast.walk(tree):
         if isinstance(node, ast.Import):
@@ -104,7 +104,7 @@ def test_sources_call_no_function_that_rounds_differently(name):
 
 
 def imported_by_scenes():
-    """Functions that the kernels of all scenes import, by name; with those of whatever else this process has run."""
+    """Return the kernels that import each function, after a few ticks of every scene in this process."""
     for case in CASES.values():
         config = case.resolve()
         BlockDiagram(config, create_all(config), 16).advance(2)

@@ -1,11 +1,11 @@
-"""No module imports itself by way of others: not at the top, not inside of functions, not for type checkers only."""
+"""Absence of import cycles, including imports in functions and for type checkers only."""
 
 import ast
 from pathlib import Path
 
 
 def imports():
-    """The modules of this project that each module imports, anywhere in its source."""
+    """Return the modules of this project that each module imports anywhere in its source."""
     paths = [
         *Path("lapwing").rglob("*.py"),
         *Path("lapwing/services").rglob("*.py"),
@@ -15,20 +15,20 @@ def imports():
     names = {name.removesuffix(".__init__"): path for path, name in files.items()}
     result = {}
     for name, path in names.items():
-        taken = set()
+        imported = set()
         for node in ast.walk(ast.parse(path.read_text())):
             if isinstance(node, ast.Import):
-                taken |= {alias.name for alias in node.names}
+                imported |= {alias.name for alias in node.names}
             elif isinstance(node, ast.ImportFrom) and node.module:
                 inner = {f"{node.module}.{alias.name}" for alias in node.names}
-                taken |= inner & names.keys() or {node.module}
-                taken |= {node.module} if inner - names.keys() else set()
-        result[name] = (taken & names.keys()) - {name}
+                imported |= inner & names.keys() or {node.module}
+                imported |= {node.module} if inner - names.keys() else set()
+        result[name] = (imported & names.keys()) - {name}
     return result
 
 
 def cycle(graph):
-    """A way from a module back to itself, None if there is none."""
+    """Return the names along an import cycle, or None."""
     done = set()
 
     def search(name, way):
@@ -49,7 +49,7 @@ def test_cycle_is_found():
     assert cycle({"a": {"b"}, "b": {"c"}, "c": {"b"}}) == ["b", "c", "b"]
 
 
-def test_there_is_no_import_cycle():
+def test_project_has_no_import_cycle():
     graph = imports()
     assert len(graph) > 400
     assert cycle(graph) is None

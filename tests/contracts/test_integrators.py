@@ -1,4 +1,4 @@
-"""Every integrator there is: its measured order on each kind of space, and whether it stays on the manifold."""
+"""Contract of every integrator: measured order on each kind of space, and distance from the manifold."""
 
 import math
 from typing import NamedTuple
@@ -26,9 +26,9 @@ EPS = 2.2e-16
 
 
 class EverySpace(NamedTuple):
-    """One independent problem on each space, none of which commutes or is autonomous; as a product, one more test."""
+    """One independent problem for each space, none commutative or autonomous; the product is a further test."""
 
-    pendulum: Vec3  # R^n: angle, velocity, and a number that is driven
+    pendulum: Vec3  # R^n: angle, velocity, driven number
     quaternion: Quaternion
     matrix: Rotation
     direction: Direction
@@ -42,7 +42,7 @@ class EverySpaceParameters(NamedTuple):
 
 @always_inline
 def _turning(drive, t, forward_in_body):
-    """Angular velocity that depends on time and attitude."""
+    """Return an angular velocity that depends on time and attitude."""
     return add((drive * math.cos(t), 0.5 * math.sin(2.0 * t), 0.8 + 0.3 * t), scale(0.7, forward_in_body))
 
 
@@ -96,7 +96,7 @@ COUNTS[8] = (7, 10, 13)
 
 
 def reference(p, x0):
-    """SciPy's DOP853 in the embedding at 1e-13."""
+    """Return the solution of SciPy's DOP853 in the embedding, with a tolerance of 1e-13."""
     rate = RATES[type(p)].py_func
 
     def right_hand_side(t, y):
@@ -117,7 +117,7 @@ def problem(method):
 
 
 def defect(x):
-    """Distance of the invariants of every manifold leaf from where they should be."""
+    """Return the largest error of the invariants of all manifold leaves."""
     if isinstance(x, Quaternion | Direction):
         return abs(sum(c * c for c in x) - 1.0)
     if isinstance(x, Rotation):
@@ -152,7 +152,7 @@ def test_order_and_manifold(name, exact):
 
 
 class CountingNumberParameters(NamedTuple):
-    """x' = x, which counts how often it is asked."""
+    """x' = x with a count of evaluations."""
 
     count: np.ndarray
 
@@ -164,7 +164,7 @@ def counting_number_rate(p, t, x):
 
 
 class CountingBodyParameters(NamedTuple):
-    """The twisted body, which counts how often it is asked."""
+    """Twisted body with a count of evaluations."""
 
     inertia: Vec3
     count: np.ndarray
@@ -180,7 +180,7 @@ RATES.update({CountingNumberParameters: counting_number_rate, CountingBodyParame
 
 
 @pytest.mark.parametrize("name", [n for n in integrators.names() if hasattr(integrators.get(n), "EVALUATIONS")])
-def test_evaluations_are_as_declared(name):
+def test_evaluations_equal_declared_count(name):
     method, (body, start), count = integrators.get(name), BODY, np.zeros(1, dtype=np.int64)
     on_body = hasattr(method, "incompatibility")
     p = CountingBodyParameters(body.inertia, count) if on_body else CountingNumberParameters(count)

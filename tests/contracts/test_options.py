@@ -12,7 +12,7 @@ import typer
 from lapwing.cli.main import app
 
 SHORT = "--set run.duration=0.2 --set success.require=[]"
-GYROSTAT = Path("lapwing/scenes/gyrostat_blocked.toml").resolve()  # the name alone is that of a problem
+GYROSTAT = Path("lapwing/scenes/gyrostat_blocked.toml").resolve()  # without a path, it names an accuracy problem
 COMMANDS = {  # run here, in this order, in one folder
     "run": f"run hover {SHORT} --mode single-process --speed max --log a.mcap --report a.pdf --json a.json",
     "check": "check hover --set run.seed=2",

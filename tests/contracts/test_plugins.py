@@ -1,4 +1,4 @@
-"""Modules of users import nothing of Lapwing besides `lapwing` and `lapwing.plugins`."""
+"""User modules import only `lapwing` and `lapwing.plugins` from Lapwing."""
 
 import ast
 import re

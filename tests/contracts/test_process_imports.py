@@ -1,4 +1,4 @@
-"""Imports of lock-step processes: only those needed to fly, none that resolve, draw or print."""
+"""Imports of lock-step processes: only those needed to fly, no resolver, plots or console."""
 
 import subprocess
 import sys
@@ -13,7 +13,7 @@ pytestmark = pytest.mark.long
 
 OWN = {"lapwing"}
 NEEDED = {"annotated_types", "llvmlite", "numba", "numpy", "typing_extensions", "zenoh"}
-# numpy's, and what numba imports where it is installed
+# optional imports of numpy and numba
 BY_OTHERS = {"cffi", "charset_normalizer", "colorama", "cython_runtime", "pycparser", "scipy", "yaml"}
 CHILD = """
 import sys
@@ -64,7 +64,7 @@ def check_scipy(modules):
 
 
 def test_scene_is_loaded_without_scipy_and_mavlink():
-    """SciPy takes longer to import than a scene takes to load, MAVLink's messages a third of that time."""
+    """Importing SciPy takes longer than loading a scene; importing MAVLink messages takes a third of that time."""
     code = "from lapwing.cli.preflight import with_solver_selected as load; load('groundstation', [])"
     command = [sys.executable, "-P", "-c", f"{code}; import sys; print(*sys.modules)"]
     modules = subprocess.run(command, capture_output=True, text=True, check=True).stdout.split()

@@ -1,4 +1,4 @@
-"""Every scene that ships is valid; those that repeat published figures come out as they should."""
+"""Every shipped scene is valid; scenes of published experiments reproduce the published figures."""
 
 import json
 import subprocess
@@ -18,7 +18,7 @@ SCENES = sorted((ROOT / "lapwing/scenes").glob("*.toml"))
 
 
 def fly(scene, folder):
-    """The figures of a run in one process."""
+    """Return the figures of a run in one process."""
     figures = folder / "figures.json"
     command = [sys.executable, "-m", "lapwing", "run", str(scene), "--mode", "single-process"]
     command += ["--log", str(folder / "log.mcap"), "--json", str(figures)]
@@ -40,7 +40,7 @@ def test_tuned_gains_on_sensors_stay_below_table_7(tmp_path):
         assert flight["rmse"][axis] < value, axis
 
 
-def test_paper_gains_on_truth_repeat_table_7_in_translation(tmp_path):
+def test_paper_gains_on_truth_reproduce_table_7_in_translation(tmp_path):
     scene = ROOT / "lapwing/scenes/delivery_paper.toml"
     published = load(scene)[Published].rmse
     flight = fly(scene, tmp_path)
@@ -49,7 +49,7 @@ def test_paper_gains_on_truth_repeat_table_7_in_translation(tmp_path):
         assert flight["rmse"][axis] == pytest.approx(published[axis], rel=0.25), axis
 
 
-def test_full_delivery_comes_home_two_kilograms_lighter(tmp_path):
+def test_full_delivery_returns_two_kilograms_lighter(tmp_path):
     scene = ROOT / "lapwing/scenes/delivery_full.toml"
     published = load(scene)[Published].rmse
     flight = fly(scene, tmp_path)

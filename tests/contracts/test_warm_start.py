@@ -1,4 +1,4 @@
-"""A scene that has been flown once, or compiled ahead, starts without compiling anything."""
+"""A scene starts without compilation after a run or `precompile`."""
 
 import json
 import subprocess
@@ -24,7 +24,7 @@ app(sys.argv[1:], standalone_mode=False)
 print(json.dumps([compiled, looked_up]))
 """
 
-# Children are forked: they have what is changed here. Each writes what it looks up, and whether it has joined by then.
+# Forked children inherit these changes. Each writes the kernels that it looks up, and its name once it has joined.
 JOINS = """
 import sys
 from pathlib import Path
@@ -66,7 +66,7 @@ def test_second_run_does_not_compile(tmp_path):
 
 
 def test_precompile_covers_all_kernels_of_run(tmp_path):
-    """And hence compiles, and keeps: without a cache of its own, for which all would be compiled once more."""
+    """Compare looked-up kernels in the shared cache; a new cache would compile all kernels again."""
     _, ahead = kernels("precompile", "hover")
     compiled, looked_up = flown(tmp_path)
     assert compiled == []
@@ -75,8 +75,8 @@ def test_precompile_covers_all_kernels_of_run(tmp_path):
 
 @pytest.mark.skipif(sys.platform != "linux", reason="processes are not forked")
 @pytest.mark.parametrize("scene", ["hover", "delivery_mission"])
-def test_no_process_needs_kernel_once_run_has_begun(tmp_path, scene):
-    """A process that looks up a kernel then would compile it with an empty cache."""
+def test_joined_process_looks_up_no_kernel(tmp_path, scene):
+    """With an empty cache, a process would compile a kernel that it looks up after joining."""
     words = ["run", scene, "--set", "run.duration=0.5", "--set", "success.require=[]", "--log", tmp_path / "log.mcap"]
     subprocess.run([sys.executable, "-c", JOINS, tmp_path / "told", *words], check=True, capture_output=True)
     looked_up = [line.split(" ") for line in (tmp_path / "told").read_text().splitlines()]

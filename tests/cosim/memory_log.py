@@ -1,4 +1,4 @@
-"""Flights in this process whose messages stay in memory."""
+"""Flights in this process with recorded messages in memory."""
 
 from collections.abc import Callable, Iterable
 from typing import Any
@@ -29,7 +29,7 @@ class MemoryLog:
         self._decoded: dict[str, list[Any]] = {}
 
     def write(self, pages: Iterable[RecordBatch], last: int) -> None:
-        """Take the pages of some ticks; called as `lapwing.cosim.log.log_sequencer.Recording.write`."""
+        """Store the batches of some ticks; see `lapwing.cosim.log.log_sequencer.Recording.write`."""
         for page in pages:
             name = page.topic.name.removeprefix("{vehicle}/")
             self._topics[name] = page.topic
@@ -37,35 +37,35 @@ class MemoryLog:
         self._decoded.clear()
 
     def finish(self) -> None:
-        """Nothing is left; called as `lapwing.cosim.log.log_sequencer.Recording.finish`."""
+        """Do nothing; see `lapwing.cosim.log.log_sequencer.Recording.finish`."""
 
     @property
     def topics(self) -> dict[str, Topic]:
-        """The topics that were spoken on, by name."""
+        """Topics with messages, by name."""
         return dict(self._topics)
 
     def payloads(self, name: str) -> list[tuple[int, bytes]]:
-        """(tick, payload) of each message of a topic, in order."""
+        """Return (tick, payload) of each message of a topic, in order of ticks."""
         result = [
             (int(tick), payload.tobytes())
             for page in self._pages.get(name, ())
             for tick, payload in zip(page.ticks, page.payloads, strict=True)
         ]
-        return sorted(result, key=lambda message: message[0])  # stable: as they came within a tick
+        return sorted(result, key=lambda message: message[0])  # stable within a tick
 
     def messages(self, name: str) -> list[Any]:
-        """The messages of a topic."""
+        """Return the messages of a topic."""
         if name not in self._decoded:
             decode = self._topics[name].message.decode
             self._decoded[name] = [decode(payload) for _, payload in self.payloads(name)]
         return self._decoded[name]
 
     def times(self, name: str) -> np.ndarray:
-        """Simulation times of a topic's messages [s], shape (n,)."""
+        """Return the simulation times of a topic's messages [s], shape (n,)."""
         return np.array([tick for tick, _ in self.payloads(name)]) * self.setup.interval_ns * 1e-9
 
     def column(self, name: str, value: Callable[[Any], Any]) -> np.ndarray:
-        """`value(message)` for each message of a topic, shape (n,) or (n, k)."""
+        """Return `value(message)` for each message of a topic, shape (n,) or (n, k)."""
         return np.array([value(message) for message in self.messages(name)])
 
     @property
@@ -74,13 +74,13 @@ class MemoryLog:
         return classify(self.view("ground_truth"), self.view("status")).kind in LANDED
 
     def view(self, name: str) -> TopicView:
-        """A topic as columns."""
+        """Return a topic as columns."""
         ticks, payloads = zip(*self.payloads(name), strict=True)
         return TopicView(np.array(ticks) * self.setup.interval_ns, history(self._topics[name].message, payloads))
 
     @property
     def digest(self) -> str:
-        """Return the digest of the log."""
+        """Digest of the log."""
         digest = Digest()
         for name, topic in self._topics.items():
             for tick, payload in self.payloads(name):
@@ -91,7 +91,7 @@ class MemoryLog:
 def fly(
     scene: Scene | RunConfig, operator: Callable[[int], Iterable[Any]] | None = None, last: int | None = None
 ) -> MemoryLog:
-    """Fly a scene in this process, to the tick `last` or to its end; `operator` gives the commands until a tick."""
+    """Fly a scene in this process, to the tick `last` or to its end; `operator` returns the commands until a tick."""
     setup = scene if isinstance(scene, RunConfig) else resolve(scene)
     log = MemoryLog(setup)
     run_single(BlockDiagram(setup, create_all(setup, operator), PAGE), log, last=last)  # type: ignore[arg-type]

@@ -1,4 +1,4 @@
-"""Every topic's message made from a single value, field by field: what a page of messages must be equal to."""
+"""Reference messages of every topic, made from a single value, field by field."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Graphs of a few parts, without a scene."""
+"""Diagrams of a few blocks, without a scene."""
 
 from lapwing.cosim.config.run_config import RunConfig, ServiceConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram, Service
@@ -7,12 +7,12 @@ NAME = "test"
 
 
 def setup_of(ports=(), last=10_000):
-    """A run of one service that gives these ports."""
+    """Return the configuration of a run with one service and these ports."""
     return RunConfig(
         NAME, "", 1, last, 100, 10_000_000, "gauss_seidel", "drone1", {NAME: ServiceConfig(None, (), ports)}, {}, {}
     )
 
 
 def graph_of(*parts, ports=(), wires=(), page=8):
-    """The graph of these parts; `ports` are those that they take from elsewhere."""
+    """Return the diagram of these blocks; `ports` are their ports of other services."""
     return BlockDiagram(setup_of(ports), [Service(NAME, list(parts), list(wires))], page)

@@ -1,5 +1,6 @@
-"""A run in one graph and one in a graph for each service, which hand each other bundles tick by tick as processes do,
-record the same bytes."""
+"""A run in one diagram records the same bytes as a run with a diagram for each service.
+
+The diagrams exchange step packets at each tick, as processes do."""
 
 from functools import cache
 
@@ -51,12 +52,12 @@ def case(name):
 
 @cache
 def fly_together(name):
-    """Return the flight of a case in one graph."""
+    """Return the flight of a case in one diagram."""
     return fly(*case(name))
 
 
 def fly_apart(setup, operator):
-    """Every service with a graph of its own; what it records comes through batches of uneven lengths."""
+    """Run each service in a separate diagram; its records arrive in log packets of unequal length."""
     services = create_all(setup, operator)
     graphs = {service.name: BlockDiagram(setup, [service], 64) for service in services}
     bundles = {name: StepPacketCodec(service.ports) for name, service in setup.services.items()}
@@ -82,7 +83,7 @@ def fly_apart(setup, operator):
 
 
 @pytest.mark.parametrize("name", CASES)
-def test_together_and_apart_record_same(name):
+def test_separate_diagrams_record_same_bytes(name):
     together, apart = fly_together(name), fly_apart(*case(name))
     assert apart.topics.keys() == together.topics.keys()
     for topic in together.topics:
@@ -90,7 +91,7 @@ def test_together_and_apart_record_same(name):
     assert apart.digest == together.digest
 
 
-def test_agreement_cases_cover_their_names():
+def test_cases_have_events_of_their_names():
     faults = fly_together("sensors that fail")
     assert any(m.rejected_sources for m in faults.messages("estimate"))
     assert any(m.status.status < 0 for m in faults.messages("gps/fix"))

@@ -1,4 +1,4 @@
-"""Delivery by Zenoh when a session closes: a message published just before may be lost, a confirmed one is not.
+"""Delivery by Zenoh at the end of a session: recent messages may be lost, confirmed messages are not.
 
 `Participant.leave` therefore waits for confirmations.
 """
@@ -16,7 +16,7 @@ MESSAGES, SIZE = 400, 100_000
 
 
 def receive(endpoint, results, slow):
-    """Count the messages of two senders, slowly; the last one of a sender is confirmed by a token."""
+    """Count the messages of a sender slowly; confirm the last one by a liveliness token."""
     count, done = 0, threading.Event()
 
     with ZenohBus(connect=[endpoint], awaits=False) as bus:
@@ -31,7 +31,7 @@ def receive(endpoint, results, slow):
         while (result := news.get(0.2)) is not None or not done.is_set():
             if result:
                 count += 1
-                sum(range(slow))  # keeps the interpreter, which the session needs, too
+                sum(range(slow))  # keeps the interpreter busy, which the session needs
                 if result[0] == MESSAGES - 1:
                     bus.declare_liveliness(CONFIRMED)
     results.put(count)

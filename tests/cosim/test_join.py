@@ -1,4 +1,4 @@
-"""Participants on several hosts compare what they have resolved before they fly."""
+"""Participants on several hosts compare their configurations and check certificates before a flight."""
 
 import subprocess
 import sys
@@ -59,7 +59,7 @@ def test_participant_with_other_configuration_is_rejected(tmp_path):
         assert len(output.splitlines()) == 1
 
 
-def test_same_set_up_flies_over_certified_links_to_same_digest(tmp_path):
+def test_digest_over_certified_links_equals_single_process(tmp_path):
     keys, log, alone = tmp_path / "keys", tmp_path / "log.mcap", tmp_path / "alone.mcap"
     make(keys, ["plant", "recorder"], 1)
     peers = {name: end.replace("tcp/", "tls/") for name, end in loopback_endpoints(["plant", "recorder"]).items()}
@@ -83,7 +83,7 @@ def test_start_without_certificate_needs_insecure(tmp_path):
 
 
 def test_participant_cannot_publish_for_others(tmp_path):
-    """Also where it knows the marks of the others: access control refuses it on both ends of a link."""
+    """Access control drops the messages at both ends of a link, even with the publisher ids of others."""
     keys, run = tmp_path / "keys", PublisherIds("test-access")
     make(keys, ["plant", "sensors"], 1)
     setup = resolve(load("delivery_mission"))
@@ -106,7 +106,7 @@ def test_participant_cannot_publish_for_others(tmp_path):
             bus.publisher(f"test-access/{STEP_KEY}/{name}")(b"own", 0)
         for name, bus, other in pairs:
             messages = [received[name].get_with_key(timeout=PATIENCE) for _ in range(2)]
-            # what a session publishes itself comes back to it unfiltered
+            # a session receives its own messages unfiltered
             assert sorted(messages) == [
                 (f"test-access/{STEP_KEY}/autopilot", 0, b"forged"),
                 (f"test-access/{STEP_KEY}/{other}", 0, b"own"),
@@ -128,7 +128,7 @@ def test_viewer_reads_only_and_needs_certificate(tmp_path):
         withheld = viewer.subscribe(f"test-viewer/{STEP_KEY}/*")
         received, read = autopilot.subscribe("test-viewer/**"), viewer.subscribe(topic)
         publish, step = autopilot.publisher(topic), autopilot.publisher(bundles)
-        while (message := read.get(timeout=0.1)) is None:  # until the subscriptions have come
+        while (message := read.get(timeout=0.1)) is None:  # until the subscriptions have arrived
             step(b"bundle", 0)
             publish(b"status", 0)
         assert message == (0, b"status")
@@ -138,8 +138,8 @@ def test_viewer_reads_only_and_needs_certificate(tmp_path):
             viewer._session.put(f"test-viewer/{key}", b"command")
             viewer._session.delete(f"test-viewer/{key}")
         viewer.declare_liveliness(f"test-viewer/{ALIVE_KEY}/plant")
-        assert autopilot.wait_for_liveliness([f"test-viewer/{ALIVE_KEY}/plant"], 1.0)  # is not there
+        assert autopilot.wait_for_liveliness([f"test-viewer/{ALIVE_KEY}/plant"], 1.0)  # still absent
         while (message := received.get_with_key(timeout=1.0)) is not None:
-            assert message in ((topic, 0, b"status"), (bundles, 0, b"bundle"))  # its own
+            assert message in ((topic, 0, b"status"), (bundles, 0, b"bundle"))  # own messages
         with pytest.raises(BusError):
             ZenohBus(connect=[end], mode="client").close()

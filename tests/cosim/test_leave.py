@@ -1,4 +1,4 @@
-"""Participants leave a run after the others have confirmed their last message, or have left."""
+"""Participants leave a run once the others have confirmed their last message or left."""
 
 import threading
 from collections import Counter
@@ -23,7 +23,7 @@ SETUP = RunConfig("", "", 1, 1, 250, 4_000_000, "gauss_seidel", "drone1", {}, {}
 
 @contextmanager
 def joined(monkeypatch, external=()):
-    """A process that has joined, and the session of the only other participant."""
+    """Yield a joined participant, and the session of the only other one."""
     monkeypatch.setattr(lapwing.cosim.executors.stop_request.signal, "signal", lambda *_: None)
     monkeypatch.setattr(lapwing.cosim.executors.participant, "on_compile", lambda messages: None)
     with private_endpoints(["plant"]) as endpoints, ZenohBus([endpoints["plant"]], awaits=False) as bus:

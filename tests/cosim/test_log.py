@@ -15,7 +15,7 @@ from lapwing.messages.digest import Digest
 
 
 def messages(count=300):
-    """Topic, message, time: three topics, some at the same times, one of them late."""
+    """Return (topic, message, time) of three topics, some at equal times, one of them late."""
     rng = random.Random(1)
     result = []
     for k in range(count):
@@ -49,7 +49,7 @@ def path(tmp_path):
 
 
 @pytest.mark.parametrize("flush_each", [0, 1, 50])
-def test_everything_comes_back_in_order_of_time_then_writing(path, flush_each):
+def test_log_is_read_in_order_of_time_then_writing(path, flush_each):
     entries = messages()
     digest = write(path, entries, {"seed": "7"}, {"scene.toml": b"a = 1\n"}, flush_each)
     with LogReader(path) as log:
@@ -66,7 +66,7 @@ def test_everything_comes_back_in_order_of_time_then_writing(path, flush_each):
 
 
 @pytest.mark.parametrize("flush_each", [0, 20])
-def test_selection(path, flush_each):
+def test_log_is_read_by_topic_and_time(path, flush_each):
     entries = messages()
     write(path, entries, flush_each=flush_each)
     with LogReader(path) as log:
@@ -76,7 +76,7 @@ def test_selection(path, flush_each):
             next(log.messages(["/mag"]))
 
 
-def test_two_readings_at_once(path):
+def test_log_may_be_read_twice_at_once(path):
     entries = messages()
     write(path, entries, flush_each=20)
     with LogReader(path) as log:
@@ -100,7 +100,7 @@ def test_digest_depends_on_content_only(tmp_path):
     assert write(tmp_path / "d", entries[:-1]) not in digests
 
 
-def test_messages_that_are_not_deterministic_stay_out_of_digest(tmp_path):
+def test_digest_ignores_nondeterministic_messages(tmp_path):
     entries = messages(10)
     with LogWriter(tmp_path / "a", {}, {}) as log:
         for topic, message, t in entries:
@@ -113,7 +113,7 @@ def test_messages_that_are_not_deterministic_stay_out_of_digest(tmp_path):
         assert "/wall_time" in read.topics()
 
 
-def test_opens_in_mcaps_own_reader_with_matching_summary(path):
+def test_mcap_library_reads_log_with_matching_summary(path):
     entries = messages()
     digest = write(path, entries, {"seed": "7"}, {"scene.toml": b"x"}, flush_each=40)
     with open(path, "rb") as file:
@@ -138,7 +138,7 @@ def test_opens_in_mcaps_own_reader_with_matching_summary(path):
         assert imu[0].header.frame_id == "drone1/base_link"
 
 
-def test_opens_in_rosbags_library(path):
+def test_rosbags_library_reads_log(path):
     entries = messages()
     entries.append(("/drone1/status", Status(header(5, ""), "auto", "hover", True), 5))
     write(path, entries, flush_each=40)
@@ -152,7 +152,7 @@ def test_opens_in_rosbags_library(path):
         assert (decoded.mode, decoded.phase, decoded.armed, decoded.landed) == ("auto", "hover", True, False)
 
 
-def test_empty_log_is_log(path):
+def test_empty_log_is_complete(path):
     digest = write(path, [])
     with LogReader(path) as log:
         assert (list(log.messages()), log.topics(), log.complete) == ([], {}, True)
@@ -182,7 +182,7 @@ def test_log_of_killed_writer_is_readable(path):
         assert [t for _, _, t, _ in log.messages()] == list(range(1000))
 
 
-def test_truncated_log_reads_to_last_whole_chunk(path, tmp_path):
+def test_truncated_log_is_read_to_last_complete_chunk(path, tmp_path):
     entries = messages(60)
     write(path, entries, flush_each=20)
     whole = path.read_bytes()
@@ -212,7 +212,7 @@ def test_paused_writer_flushes_with_next_message(path, monkeypatch):
     log.close()
 
 
-def test_faults_are_one_clear_line(path, tmp_path):
+def test_unusable_files_raise_clear_errors(path, tmp_path):
     with pytest.raises(ValueError, match="cannot write the log: No such file"):
         LogWriter(tmp_path / "missing" / "run.mcap", {}, {})
     with pytest.raises(ValueError, match="cannot write the log: Is a directory"):
@@ -240,6 +240,6 @@ def test_full_disk_is_clear_error():
         write("/dev/full", messages(5))
 
 
-def test_unknown_type_names_are_refused(path):
+def test_unknown_type_name_is_rejected(path):
     with LogWriter(path, {}, {}) as log, pytest.raises(ValueError, match="unknown message type a/msg/B"):
         log.write("/a", "a/msg/B", b"", 0)

@@ -1,4 +1,4 @@
-"""Chunks of other programs' logs: read however they are packed, and refused where they would fill the memory."""
+"""Chunks in logs of other programs: read in any compression, rejected if they would fill the memory."""
 
 import os
 import re
@@ -18,7 +18,7 @@ from lapwing.cosim.log import LogReader, mcap_contents
 from lapwing.cosim.log.mcap_writer import encode
 
 MESSAGE = encode(Message(channel_id=1, data=b"hello", log_time=5, publish_time=5, sequence=0))
-LARGEST = 1 << 20  # [bytes] instead of 256 times as much
+LARGEST = 1 << 20  # [bytes], 1/256 of the default
 BOMB = bytes(64 * LARGEST)
 
 
@@ -76,7 +76,7 @@ def write_many(path, count, size):
 
 
 @pytest.mark.parametrize("command", [["info"], ["report"], ["verify"], ["export", "--csv", "out"], ["resimulate"]])
-def test_command_rejects_log_that_unpacks_beyond_its_limit(command, tmp_path):
+def test_command_rejects_log_that_unpacks_beyond_limit(command, tmp_path):
     log = write_many(tmp_path / "bomb.mcap", 40, 64 << 20)  # 2.7 GB from 100 kB
     name, *options = command
     call = [sys.executable, "-m", "lapwing", name, str(log), *options]
@@ -89,7 +89,7 @@ def test_command_rejects_log_that_unpacks_beyond_its_limit(command, tmp_path):
 
 
 @pytest.mark.long
-def test_flight_memory_grows_by_at_most_eight_times_its_payloads(tmp_path):
+def test_memory_is_at_most_eight_times_payloads(tmp_path):
     read = (
         "import resource, sys, lapwing; lapwing.read_log(sys.argv[1]).rmse;"
         "print(resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024)"

@@ -1,4 +1,4 @@
-"""Pages of columns give the log that single messages give."""
+"""Record batches and single messages produce the same log."""
 
 import itertools
 import random
@@ -20,7 +20,7 @@ TICK = 4_000_000  # [ns]
 
 
 def page(first, ticks=50):
-    """Parts of a page: the IMU at every tick; the estimate at every fifth, of varying size."""
+    """Return the parts of a page: the IMU at every tick, the estimate at every fifth, of varying size."""
     rng = np.random.default_rng(first)
     ticks = np.arange(first, first + ticks)
     times = ticks * TICK
@@ -38,7 +38,7 @@ def page(first, ticks=50):
 
 
 def single(parts):
-    """The messages of a page one by one, in their order: topic, class, payload, time."""
+    """Return the messages of a page in order: topic, class, payload, time."""
     result = []
     for topic, message, times, payloads, order in parts:
         result += zip(order.tolist(), itertools.repeat((topic, message)), payloads, times.tolist(), strict=False)
@@ -138,7 +138,7 @@ def test_other_tools_find_messages_of_page_by_time(tmp_path):
         assert [time_ns for _, time_ns, _ in result] == expected
 
 
-def test_equal_pages_give_equal_file_at_any_wall_time(tmp_path, monkeypatch):
+def test_file_of_equal_pages_is_independent_of_wall_time(tmp_path, monkeypatch):
     files = []
     for speed in (0.01, 3.0):
         clock = itertools.count(0.0, speed)
@@ -177,7 +177,7 @@ def test_arrays_may_be_reused_after_call(tmp_path):
     assert (tmp_path / "a").read_bytes() == (tmp_path / "b").read_bytes()
 
 
-def test_empty_page_is_no_chunk(tmp_path):
+def test_empty_page_adds_no_chunk(tmp_path):
     write_pages(tmp_path / "log", [[], page(0, 0)])
     with LogReader(tmp_path / "log") as log:
         assert list(log.messages()) == []
@@ -194,13 +194,13 @@ def test_empty_page_is_no_chunk(tmp_path):
         ({3: np.zeros((50, 8))}, r"/drone1/imu: payloads are float64 \(50, 8\), expected uint8"),
     ],
 )
-def test_pages_that_do_not_fit_are_refused(tmp_path, change, words):
+def test_inconsistent_pages_are_rejected(tmp_path, change, words):
     part = [change.get(k, value) for k, value in enumerate(page(0)[0])]
     with LogWriter(tmp_path / "log", {}, {}) as log, pytest.raises(ValueError, match=words):
         log.write_page([tuple(part)])
 
 
-def test_negative_time_of_single_message_is_refused(tmp_path):
+def test_negative_time_of_single_message_is_rejected(tmp_path):
     with LogWriter(tmp_path / "log", {}, {}) as log, pytest.raises(ValueError, match="/a: time -4 ns is negative"):
         log.write("/a", Imu, Imu().encode(), -4)
 
@@ -233,7 +233,7 @@ def test_history_reads_only_chunks_of_its_topic(tmp_path):
         log.write_page([("/a", Vector3, np.zeros(50, int), Record.of(Vector3()).encode(50, {}), np.zeros(50, int))])
         log.write_page(page(0))
     data = bytearray(path.read_bytes())
-    at = data.index(b"\x28\xb5\x2f\xfd")  # of the first compressed chunk
+    at = data.index(b"\x28\xb5\x2f\xfd")  # start of the first compressed chunk
     data[at + 12] ^= 0xFF
     path.write_bytes(data)
     with LogReader(path) as log:
@@ -242,7 +242,7 @@ def test_history_reads_only_chunks_of_its_topic(tmp_path):
             log.history("/a")
 
 
-def test_log_without_message_indexes_is_read_as_well(tmp_path):
+def test_log_without_message_indexes_is_read(tmp_path):
     path = tmp_path / "other.mcap"
     with open(path, "wb") as file:
         writer = Writer(file, index_types=IndexType.NONE)

@@ -1,4 +1,4 @@
-"""A process whose launcher is gone ends by itself, also while it is busy, and leaves no folder."""
+"""A process ends and leaves no folder when its launcher has ended, even while it is busy."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Compiled parts count no references to arrays, and what they hold is still freed once, when its last owner goes."""
+"""Compiled blocks do not count references to arrays, which are still freed once, with their last owner."""
 
 import gc
 import sys
@@ -20,7 +20,7 @@ SUM = Port("sum", Sum(0.0))
 
 
 def counts(parameters):
-    """Return True if the code of blocks of this class counts references."""
+    """Return, for each compiled version of blocks of this class, True if it counts references."""
     compiled = [result for result in advance.overloads.values() if parameters.__name__ in str(result.signature)]
     modules = [result.library._get_module_for_linking() for result in compiled]
     return [any(function.name == "NRT_incref" for function in module.functions) for module in modules]
@@ -56,7 +56,7 @@ def test_arrays_changed_in_place_are_freed_with_owner(living):
 
 
 def test_function_called_from_python_counts_references():
-    """Code has it by its name: that of a part, which does not count, must not be taken for it."""
+    """The code for blocks has the same name, but does not count references; it must not be used here."""
     p, s = Mean(np.linspace(-1.0, 2.0, 5)), Last(np.arange(5.0), 0)
     graph = graph_of(Block("mean", p, Cell(s), (), (SUM,)))
     graph.advance(TICKS)
@@ -73,9 +73,9 @@ def test_block_that_allocates_arrays_frees_them(living):
     part = Block("squares", Squares(7), Cell(Last(np.zeros(7), 0)), (), (SUM,))
     graph = graph_of(part)
     graph.advance(10)
-    held = living()
+    allocated = living()
     graph.advance(TICKS)
-    assert living() == held
+    assert living() == allocated
     assert graph.latest("sum", TICKS - 1).number == 91.0
     assert read(part.state).ticks.tolist() == [0.0, 1.0, 4.0, 9.0, 16.0, 25.0, 36.0]
     assert counts(Squares) == [True]

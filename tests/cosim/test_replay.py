@@ -1,4 +1,4 @@
-"""Replay: timing is pure; what is published and recorded again has the log's digest."""
+"""Replay: timing, keys, and a recording with the digest of the replayed log."""
 
 import os
 import pty
@@ -52,11 +52,11 @@ def test_speed_scales_time_between_messages():
     assert [due.wait for due in schedule(messages(3), 2.0)] == pytest.approx([0.0, 0.002, 0.004])
 
 
-def test_at_top_speed_everything_is_due_at_once():
+def test_all_messages_are_due_at_once_at_maximum_speed():
     assert [due.wait for due in schedule(messages(3), None)] == [0.0, 0.0, 0.0]
 
 
-def test_time_counts_from_first_message_of_cut(log):
+def test_time_starts_at_first_selected_message(log):
     cut = Cut.of(0.1, 0.2)
     with LogReader(log) as source:
         due = list(schedule(source.messages(None, cut.start_ns, cut.end_ns), 1.0))
@@ -171,7 +171,7 @@ def test_equal_times_keep_their_order_through_three_generations(tmp_path, monkey
             assert list(log.messages()) == first
 
 
-def test_only_topics_that_are_named_are_replayed(log, tmp_path, monkeypatch):
+def test_only_named_topics_are_replayed(log, tmp_path, monkeypatch):
     monkeypatch.setattr(player, "SUBSCRIBER_TIMEOUT", 0.0)
     (endpoint,) = loopback_endpoints(["a"]).values()
     received, record = [], tmp_path / "a.mcap"
@@ -185,10 +185,10 @@ def test_only_topics_that_are_named_are_replayed(log, tmp_path, monkeypatch):
 
 
 class Terminal:
-    """A clock that runs while it is waited, and keys that are typed at certain times."""
+    """Clock that only advances while waiting, and keys typed at given times."""
 
     def __init__(self, typed):
-        self.now, self.typed, self.said = 0.0, dict(typed), []
+        self.now, self.typed, self.printed = 0.0, dict(typed), []
 
     def keys(self):
         due = [at for at in self.typed if at <= self.now]
@@ -199,7 +199,7 @@ class Terminal:
 
     def went(self, messages):
         """Return the wall time of each message (due [s], time [ns])."""
-        pace, result = Pace(self.keys, self.said.append, self.wait, lambda: self.now), []
+        pace, result = Pace(self.keys, self.printed.append, self.wait, lambda: self.now), []
         for due, time_ns in messages:
             pace.wait(due, time_ns, lambda: self.now > 100.0)
             if pace.quit or self.now > 100.0:
@@ -208,16 +208,16 @@ class Terminal:
         return result
 
 
-def test_pause_holds_and_rest_follows_at_its_distance():
+def test_messages_after_pause_keep_their_distance():
     terminal = Terminal({1.5: " ", 6.0: " "})
     went = terminal.went([(float(k), k) for k in range(5)])
     assert went[:2] == pytest.approx([0.0, 1.0], abs=0.03)
     assert went[2] == pytest.approx(6.0, abs=0.03)
     assert np.diff(went[2:]) == pytest.approx([1.0, 1.0], abs=0.03)
-    assert [line.split()[0] for line in terminal.said] == ["paused", "resumed"]
+    assert [line.split()[0] for line in terminal.printed] == ["paused", "resumed"]
 
 
-def test_step_lets_all_messages_of_one_instant_go():
+def test_step_publishes_all_messages_of_one_instant():
     terminal = Terminal({0.5: " ", 10.0: ".", 20.0: ".", 30.0: "q"})
     went = terminal.went([(0.0, 0), (1.0, 7), (1.0, 7), (2.0, 9), (3.0, 11)])
     assert went == pytest.approx([0.0, 10.0, 10.0, 20.0], abs=0.05)
@@ -239,7 +239,7 @@ def test_terminal_keys_are_read_and_terminal_is_restored():
     assert termios.tcgetattr(theirs) == before
     reading, writing = os.pipe()
     os.write(writing, b"q")
-    with Keyboard(reading) as keyboard:  # no terminal: what comes there is somebody else's
+    with Keyboard(reading) as keyboard:  # not a terminal: the input belongs to another program
         assert keyboard.keys() == ""
     for descriptor in (ours, theirs, reading, writing):
         os.close(descriptor)

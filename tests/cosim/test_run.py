@@ -1,4 +1,4 @@
-"""Whole runs: the same bits in every mode, and an orderly end whatever happens to the processes."""
+"""Complete runs: equal digests in every mode, and an orderly end after failures of processes."""
 
 import json
 import os
@@ -25,8 +25,8 @@ pytestmark = pytest.mark.long
 SCENE = Path("lapwing/scenes/hover.toml")
 SHORT = ["run.duration=2"]
 SERVICES = {"autopilot", "plant", "trajectory", "recorder"}  # of this scene
-END = 10.0  # [s] a generous bound on how long an end may take; the target is 2 s
-STARTED = 300.0  # [s] a run gets to start, with kernels to compile
+END = 10.0  # [s] generous limit for the end of a run; the target is 2 s
+STARTED = 300.0  # [s] limit for the start of a run, including compilation
 
 
 def arguments(tmp_path, key_prefix, *more, overrides=()):
@@ -36,7 +36,7 @@ def arguments(tmp_path, key_prefix, *more, overrides=()):
 
 
 def single(tmp_path, *overrides):
-    """Digest of a flight in single mode."""
+    """Return the digest of a flight in single-process mode."""
     log = tmp_path / "single.mcap"
     fly_single(resolve(load(SCENE, [*SHORT, *overrides])), log)
     with LogReader(log) as read:
@@ -46,7 +46,7 @@ def single(tmp_path, *overrides):
 
 
 def processes(tmp_path, key_prefix, *overrides):
-    """Figures of a flight in processes, as `--json` gives them."""
+    """Return the `--json` figures of a flight in multi-process mode."""
     result = tmp_path / f"{key_prefix}.json"
     more = ["--json", str(result)]
     subprocess.run(arguments(tmp_path, key_prefix, *more, overrides=[*SHORT, *overrides]), check=True, timeout=600)
@@ -54,7 +54,7 @@ def processes(tmp_path, key_prefix, *overrides):
 
 
 class Running:
-    """A run in processes at real-time speed that has begun to fly; `children`: process ids by service."""
+    """Flying multi-process run at real-time speed; `children`: process ids by service."""
 
     def __init__(self, tmp_path, key_prefix, *more):
         self.log = tmp_path / f"{key_prefix}.mcap"
@@ -82,7 +82,7 @@ class Running:
             return 0
 
     def end(self):
-        """Exit code and what was said on standard error; asserts that nothing is left but a readable log."""
+        """Return exit code and standard error; assert that only a readable log is left."""
         _, output = self.launcher.communicate(timeout=STARTED)
         self.assert_gone()
         assert self._recorded() > 100
@@ -111,7 +111,7 @@ def started(tmp_path):
     if not Path("/proc/self/task").exists():
         pytest.skip("finds processes in /proc")
     runs = []
-    former = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup ignores it, and processes inherit that
+    former = signal.signal(signal.SIGHUP, signal.SIG_DFL)  # nohup ignores it, which processes inherit
 
     def start(key_prefix, *more):
         runs.append(Running(tmp_path, key_prefix, *more))
@@ -124,7 +124,7 @@ def started(tmp_path):
 
 
 def test_digest_is_equal_in_every_mode(tmp_path):
-    alone = single(tmp_path)  # first: it compiles what the processes then load
+    alone = single(tmp_path)  # first, to compile the kernels of the processes
     first, second = (processes(tmp_path, key_prefix) for key_prefix in ("test-first", "test-second"))
     assert first["digest"] == second["digest"] == alone
     assert first["sim_time_s"] == pytest.approx(2.0)
@@ -141,7 +141,7 @@ def test_failing_multibody_has_equal_digest_in_both_modes(tmp_path):
         for k, fate in enumerate(("locked", "free", "torn_off"))
     )
     mission = ["effects.air_density={}", "effects.random_wind_force={}"]  # whose bodies are compiled for other tests
-    bodies = ["vehicle.model=multibody", *mission, f"multibody.event=[{broken}]", "success.require=[]"]  # it does crash
+    bodies = ["vehicle.model=multibody", *mission, f"multibody.event=[{broken}]", "success.require=[]"]  # it crashes
     alone = single(tmp_path, *bodies)
     assert processes(tmp_path, "test-broken", *bodies)["digest"] == alone
     with LogReader(tmp_path / "test-broken.mcap") as log:
@@ -151,7 +151,7 @@ def test_failing_multibody_has_equal_digest_in_both_modes(tmp_path):
     assert reported[-1].force[3].z == 0.0
 
 
-def test_other_seed_changes_digest(tmp_path):
+def test_another_seed_changes_digest(tmp_path):
     wind = "effects.random_wind_force={mean=[1.0, 0.0, 0.0], sigma=0.5}"
     assert single(tmp_path, wind, "run.seed=1") == single(tmp_path, wind, "run.seed=1")
     assert single(tmp_path, wind, "run.seed=1") != single(tmp_path, wind, "run.seed=2")
@@ -161,14 +161,14 @@ def test_other_seed_changes_digest(tmp_path):
 
 
 IDLE = [
-    "effects.payload_release={}",  # kept
+    "effects.payload_release={}",  # never released
     "effects.rotor_damage={rotor=1,time=100.0}",  # after the end
     "effects.wind_gust={peak=[9.0,0.0,0.0],start=100.0,duration=1.0}",
 ]
 
 
 def test_idle_effects_change_no_recorded_bit(tmp_path):
-    """Idle effects do not change the log, including the random wind of another effect."""
+    """Compare logs with and without idle effects, including the random wind of another effect."""
     windy = single(tmp_path, "effects.random_wind_force={}")
     assert single(tmp_path, "effects.random_wind_force={}", *IDLE) == windy
     assert single(tmp_path) != windy
@@ -228,7 +228,7 @@ def test_launcher_stopped_during_end_of_run_succeeds(started):
 
 
 def test_killed_recorder_loses_half_second_at_most(started):
-    """Messages received before the kill are in the recovered log; best of three, for a busy machine."""
+    """Compare the recovered log with messages received before the kill; best of three, for a busy machine."""
     lost = []
     while len(lost) < 3 and min(lost, default=1.0) > 0.5:
         (door,) = loopback_endpoints(["door"]).values()
@@ -248,7 +248,7 @@ def test_killed_recorder_loses_half_second_at_most(started):
     assert min(lost) <= 0.5
 
 
-def test_service_that_freezes_is_named_and_ends_run(started):
+def test_frozen_service_is_named_and_ends_run(started):
     run = started("test-frozen")
     os.kill(run.children["autopilot"], signal.SIGSTOP)
     code, output = run.end()
@@ -258,14 +258,14 @@ def test_service_that_freezes_is_named_and_ends_run(started):
     assert run.whole()
 
 
-def test_services_end_by_themselves_when_launcher_is_killed(started):
+def test_services_end_when_launcher_is_killed(started):
     run = started("test-orphans")
     run.launcher.kill()
     run.assert_gone()
     assert run.whole()
 
 
-def test_service_that_cannot_start_for_reason_that_user_can_mend(tmp_path):
+def test_user_error_at_start_of_service_is_one_line(tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         door = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
         command = arguments(tmp_path, "test-door", "--listen", door, "--insecure")

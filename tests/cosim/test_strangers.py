@@ -36,7 +36,7 @@ def test_gids_depend_on_run_and_participant():
         f"{PREFIX}/_step/autopilot": None,
         f"{PREFIX}/_step/plant": run.gid("plant"),
     }
-    # its messages are made by a process of ours
+    # a process of Lapwing makes its messages
     assert run.senders(BATCH_KEY, ["autopilot"]) == {f"{PREFIX}/_batch/autopilot": run.gid("autopilot_messages")}
 
 
@@ -47,7 +47,7 @@ def arrivals(subscription):
     return result
 
 
-def test_only_sender_is_received():
+def test_only_messages_of_expected_sender_are_received():
     mine, key = PublisherIds(PREFIX, new_secret()), f"{PREFIX}/_step/plant"
     with private_endpoints(["a", "b", "c"]) as ends, ZenohBus(*mesh("a", ends)) as bus:
         received = bus.receive(mine.senders(STEP_KEY, ["plant"]))
@@ -74,7 +74,7 @@ def test_only_sender_is_received():
             assert arrivals(first_comer) == []
 
 
-def test_sockets_are_in_folder_of_users_own():
+def test_sockets_are_in_private_folder():
     with private_endpoints(["plant"]) as ends:
         folder = Path(ends["plant"].removeprefix("unixsock-stream/")).parent
         assert stat.S_IMODE(folder.stat().st_mode) == 0o700
@@ -82,7 +82,7 @@ def test_sockets_are_in_folder_of_users_own():
     assert not folder.exists()
 
 
-def test_long_name_of_folder_for_temporary_files_is_no_obstacle(monkeypatch, tmp_path):
+def test_sockets_work_in_long_temporary_folder(monkeypatch, tmp_path):
     long = tmp_path / ("x" * 90)
     long.mkdir()
     monkeypatch.setattr("tempfile.tempdir", str(long))
@@ -100,7 +100,7 @@ def fly(tmp_path, *more):
 
 
 def listening(pid):
-    """The TCP ports that a process listens on."""
+    """Return the TCP ports at which a process listens."""
     inodes = set()
     for entry in os.scandir(f"/proc/{pid}/fd"):
         try:
@@ -113,7 +113,7 @@ def listening(pid):
 
 @pytest.mark.skipif(not Path("/proc/net/tcp").exists(), reason="finds ports in /proc")
 def test_unauthenticated_messages_do_not_change_flight(tmp_path):
-    """Even of one who is the same user and knows where the sockets are."""
+    """Send messages as the same user through the private sockets."""
     (tmp_path / "calm").mkdir()
     short = ["--set", "run.duration=3"]
     calm = fly(tmp_path / "calm", *short)
@@ -123,7 +123,7 @@ def test_unauthenticated_messages_do_not_change_flight(tmp_path):
     while not (sockets := {s.name: s for s in tmp_path.glob("lapwing-*/*") if s.is_socket()}).keys() >= names:
         assert run.poll() is None, run.communicate()
         time.sleep(0.05)
-    while (flying := participants(run.pid)).keys() != names - {"mission"}:  # those started early are being ended
+    while (flying := participants(run.pid)).keys() != names - {"mission"}:  # unused early processes are ending
         assert run.poll() is None, run.communicate()
         time.sleep(0.05)
     assert not any(listening(pid) for pid in [run.pid, *flying.values()])

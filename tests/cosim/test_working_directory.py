@@ -1,4 +1,4 @@
-"""Files in the working directory are not imported, whatever their names."""
+"""Files in the working directory are not imported, regardless of their names."""
 
 import subprocess
 import sys

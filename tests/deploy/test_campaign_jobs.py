@@ -1,4 +1,4 @@
-"""The job files of a campaign hand every word on as it was given, and fly every part once."""
+"""Job files of a campaign pass all arguments unchanged and run each part once."""
 
 import json
 import os
@@ -9,7 +9,7 @@ from pathlib import Path
 import yaml
 
 DEPLOY = Path(__file__).parents[2] / "deploy"
-TOLD = f"""#!{sys.executable}
+RECORDER = f"""#!{sys.executable}
 import json, os, sys
 with open(os.environ["SAID"], "a") as said:
     print(json.dumps(sys.argv), file=said)
@@ -26,11 +26,11 @@ WORDS = [
 
 
 def calls(folder, *command, **environment):
-    """Return the argv of each call of `lapwing` and `sbatch`, both replaced by recorders, in order."""
+    """Return the argv of each call of `lapwing` and `sbatch`, which are replaced by recorders."""
     output = folder / "said"
     output.unlink(missing_ok=True)
     for name in ("lapwing", "sbatch"):
-        (folder / name).write_text(TOLD + ('print("77")\n' if name == "sbatch" else ""))
+        (folder / name).write_text(RECORDER + ('print("77")\n' if name == "sbatch" else ""))
         (folder / name).chmod(0o755)
     environment = {**os.environ, "PATH": f"{folder}:{os.environ['PATH']}", "SAID": str(output), **environment}
     subprocess.run(command, env=environment, check=True, cwd=folder, stdout=subprocess.DEVNULL)

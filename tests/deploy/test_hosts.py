@@ -1,4 +1,4 @@
-"""The files for two hosts and for Kubernetes: sound, complete, and as closed as the containers of one host."""
+"""Files for two hosts and Kubernetes: valid, complete, with the privileges of containers on one host."""
 
 import importlib.util
 import re
@@ -16,7 +16,7 @@ SET = {"DYNAMICS": "10.0.0.1", "FLIGHT": "10.0.0.2"}
 
 
 def composed(name):
-    """The services of a compose file, its variables set."""
+    """Return the services of a compose file with its variables substituted."""
     yaml = pytest.importorskip("yaml", reason="PyYAML is not installed")
     text = (ROOT / "deploy" / "hosts" / name).read_text()
     text = re.sub(r"\$\{(\w+)(?::-([^}]*))?\}", lambda m: SET.get(m[1], m[2]), text)
@@ -34,7 +34,7 @@ def peers_of(command):
     return parse_endpoints(command[command.index("--endpoints") + 1])
 
 
-def test_two_hosts_have_every_service_once_and_one_table():
+def test_two_hosts_share_endpoints_and_run_each_service_once():
     plant, others = composed("dynamics.yml"), composed("flight.yml")
     tables = [peers_of(service["command"]) for service in (plant | others).values()]
     assert all(table == tables[0] for table in tables)
@@ -43,11 +43,11 @@ def test_two_hosts_have_every_service_once_and_one_table():
     assert not {*plant} & {*others}
     for scene in (ROOT / "lapwing/scenes").glob("*.toml"):
         setup = resolve(load(scene))
-        if not process_table.foreign_firmware(setup):  # it runs on the host that has the firmware
+        if not process_table.foreign_firmware(setup):  # a foreign firmware runs on its own host
             assert {MONITOR, *process_table.required_processes(setup)} <= set(tables[0])
 
 
-def test_services_of_two_hosts_use_their_own_certificates():
+def test_service_of_two_hosts_has_certificate_of_its_name():
     for address, services in (("10.0.0.1", composed("dynamics.yml")), ("10.0.0.2", composed("flight.yml"))):
         for name, service in services.items():
             assert service["command"][2] == name or name == MONITOR
@@ -60,7 +60,7 @@ def test_services_of_two_hosts_use_their_own_certificates():
             assert service["healthcheck"]["test"][-1] == f": < /dev/tcp/{address}/{port}"
 
 
-def test_kubernetes_takes_manifests():
+def test_kubernetes_accepts_manifests():
     kubernetes = pytest.importorskip("kubernetes_validate", reason="kubernetes-validate is not installed")
     for each in manifests("delivery_mission"):
         kubernetes.validate(each, "1.32", strict=True)

@@ -1,4 +1,4 @@
-"""The certificates of containers (deploy/keys.sh), without Docker: kept while sound, else made anew for all."""
+"""Certificates of containers (deploy/keys.sh) without Docker: kept while valid, otherwise all renewed."""
 
 import os
 import shutil
@@ -78,7 +78,7 @@ def test_invalid_certificates_are_all_renewed(folder, lost):
     if lost in FILES:
         (folder / "keys" / "plant" / lost).unlink()
     else:
-        make(folder / "others", NAMES, 2 if lost == "expired" else 365)  # is good for less than a week
+        make(folder / "others", NAMES, 2 if lost == "expired" else 365)  # valid for less than a week
         for name in NAMES if lost == "expired" else ("plant",):
             shutil.copytree(folder / "others" / name, folder / "keys" / name, dirs_exist_ok=True)
         before |= authorities(folder)

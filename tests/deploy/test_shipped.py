@@ -1,4 +1,4 @@
-"""Contents of the images are in the bill of materials and audited."""
+"""The bill of materials and the audit cover the contents of the images."""
 
 import shutil
 import subprocess
@@ -11,7 +11,7 @@ ROOT = Path(__file__).parents[2]
 
 @pytest.mark.skipif(not shutil.which("make"), reason="needs make")
 @pytest.mark.parametrize("target", ["sbom", "audit"])
-def test_every_lock_of_image_that_ships_is_read(target):
+def test_every_lock_of_shipped_image_is_read(target):
     command = ["make", "--dry-run", "--no-print-directory", target]
     output = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
     locks = {f"deploy/{path.name}" for path in (ROOT / "deploy").glob("requirements*.lock")}

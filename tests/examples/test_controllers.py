@@ -19,7 +19,7 @@ SHORT = {
 
 
 @pytest.mark.parametrize("name", ["lqr", "geometric"])
-def test_mission_is_flown_and_ends_on_ground(name):
+def test_mission_ends_on_ground(name):
     flight = fly(load(f"examples/{name}_mission.toml", SHORT))
     assert flight.failure == ""
     assert flight.landed

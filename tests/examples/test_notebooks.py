@@ -1,4 +1,4 @@
-"""Notebook course: every notebook runs, is stored without output, and imports public names only."""
+"""Notebook course: each notebook runs, has no stored output, and imports public names only."""
 
 import ast
 import json

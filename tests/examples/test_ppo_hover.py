@@ -1,4 +1,4 @@
-"""The learning example learns; how well is seen in docs/benchmarks.md."""
+"""The learning example changes its policy; docs/benchmarks.md has its results."""
 
 import math
 

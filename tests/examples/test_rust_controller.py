@@ -1,4 +1,4 @@
-"""The autopilot in Rust takes part in the lock step: built and flown where cargo is there."""
+"""Build and lock-step flight of the autopilot in Rust, if cargo is installed."""
 
 import json
 import os
@@ -22,12 +22,12 @@ SHORT = ["--set", "run.duration=8.0"]
 
 @pytest.fixture(scope="module")
 def program():
-    """The built program."""
+    """Build the program and return its path."""
     if shutil.which("cargo") is None:
-        pytest.skip("cargo is not there")
+        pytest.skip("cargo is not installed")
     if subprocess.run(["cargo", "fetch", "--locked"], cwd=CRATE, check=False, capture_output=True).returncode:
         pytest.skip("the crates cannot be fetched")
-    # not optimised: that of the 150 crates below it takes two fifths of the time, and what it gives is the same
+    # not optimised: optimising the 150 crates takes two fifths of the build time, and the results are equal
     quick = {"CARGO_PROFILE_DEV_DEBUG": "0", "CARGO_INCREMENTAL": "0"}
     subprocess.run(["cargo", "build", "--locked", "--quiet"], cwd=CRATE, check=True, env={**os.environ, **quick})
     return Path(os.environ.get("CARGO_TARGET_DIR", CRATE / "target")) / "debug" / "rust_controller"
@@ -64,7 +64,7 @@ def test_rust_controller_flight_is_repeatable(program, tmp_path):
         resimulate(tmp_path / "first.mcap")
 
 
-def test_another_scene_than_others_is_refused(program, tmp_path):
+def test_controller_of_another_scene_is_rejected(program, tmp_path):
     run, _ = fly(program, tmp_path, tmp_path / "log.mcap", "--set", "run.seed=3")
     assert run.returncode == 2
     assert "seed is 3 here but 1 in autopilot; start all services from the same scene" in run.stderr

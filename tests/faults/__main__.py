@@ -1,9 +1,9 @@
-"""Runs with faults at random instants under random participants.
+"""Runs with a random fault of a random participant at a random time.
 
     python -m tests.faults --seed S --trials N [--jobs J] [--timeout SECONDS] [--kinds KIND ...]
 
-Each trial is made from one seed (S, S+1, ...), and is carried out again by `--seed THAT --trials 1`. Exit code 1
-where one has another end than it should.
+Each trial depends on one seed only (S, S+1, ...); repeat it with `--seed SEED --trials 1`. Exit code 1 if a trial
+does not end as specified.
 """
 
 import argparse
@@ -15,7 +15,7 @@ from tests.faults.trial import TIMEOUT, draw, fly
 
 
 def main() -> None:
-    """Fly them, and count."""
+    """Run the trials and print the counts."""
     parser = argparse.ArgumentParser(description="Runs with faults at random instants under random participants.")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--trials", type=int, default=10)

@@ -1,4 +1,4 @@
-"""A campaign that is struck: how it ends, and whether the same command goes on to the table of an undisturbed one."""
+"""Faults of a campaign: it ends as expected, and the same command continues to the undisturbed table."""
 
 import os
 import re
@@ -16,22 +16,22 @@ from tests.faults import leak_checks
 
 KILL, WORKER, INTERRUPT = "campaign kill", "campaign worker", "campaign Ctrl-C"
 COMMAND = ["campaign", "hover", "--runs", "40", "--set", "run.duration=2", "--workers", "2"]
-SHARE = {KILL: 0.7, WORKER: 0.25, INTERRUPT: 0.7}  # of the delay of a trial, after the start, or that of the workers
+SHARE = {KILL: 0.7, WORKER: 0.25, INTERRUPT: 0.7}  # of a trial's delay, from the start of the command or its workers
 ROOT = Path(__file__).parents[2]
-LONGEST = 600.0  # [s] for a whole campaign, all kernels compiled
+LONGEST = 600.0  # [s] for a complete campaign that compiles its kernels
 
 
-def _killed(code: int, said: str) -> bool:
-    return (code, said) == (-signal.SIGKILL, "")
+def _killed(code: int, text: str) -> bool:
+    return (code, text) == (-signal.SIGKILL, "")
 
 
-def _lost(code: int, said: str) -> bool:
+def _lost(code: int, text: str) -> bool:
     line = r"lapwing: a worker process has ended unexpectedly.*; run the same command again to continue\n"
-    return code == 1 and re.fullmatch(line, said) is not None
+    return code == 1 and re.fullmatch(line, text) is not None
 
 
-def _interrupted(code: int, said: str) -> bool:
-    return (code, said) == (130, "lapwing: ended by SIGINT\n")
+def _interrupted(code: int, text: str) -> bool:
+    return (code, text) == (130, "lapwing: ended by SIGINT\n")
 
 
 KINDS: dict[str, Callable[[int, str], bool]] = {KILL: _killed, WORKER: _lost, INTERRUPT: _interrupted}
@@ -40,15 +40,15 @@ KINDS: dict[str, Callable[[int, str], bool]] = {KILL: _killed, WORKER: _lost, IN
 def fly(
     kind: str, place: float, delay: float, cold: bool, folder: Path, timeout: float
 ) -> tuple[str, int, str, float, list[str]]:
-    """Strike a campaign; victim, exit code and words, the seconds until the last process has ended, what was wrong.
+    """Apply a fault to a campaign. Return the victim, exit code, standard error, seconds to the last exit, and errors.
 
     Args:
-        kind: of `KINDS`.
-        place: which worker, in [0, 1]; of Ctrl-C below 0.5 the command alone, else all, as of a terminal.
-        delay: [s].
-        cold: nothing is compiled yet.
-        folder: for all that it writes.
-        timeout: [s] for its end.
+        kind: one of `KINDS`.
+        place: worker, in [0, 1]; Ctrl-C below 0.5 reaches the command only, otherwise all processes, as in a terminal.
+        delay: [s] before the fault.
+        cold: True for an empty kernel cache.
+        folder: for all output.
+        timeout: [s] until the end of the campaign.
     """
     own, out = folder / "tmp", folder / "out"
     own.mkdir()
@@ -86,35 +86,35 @@ def fly(
         wrong.append(f"exit code {code}: {text!r}")
     if kind != KILL and (result := [path.name for place in (own, out) for path in place.glob("*/.*")]):
         wrong.append(f"left behind: {', '.join(result)}")
-    return victim, code, text.strip(), seconds, wrong + _goes_on(command, environment, out)
+    return victim, code, text.strip(), seconds, wrong + _continues(command, environment, out)
 
 
-def _goes_on(command: list[str], environment: dict[str, str], out: Path) -> list[str]:
+def _continues(command: list[str], environment: dict[str, str], out: Path) -> list[str]:
     """Return the problems of running the same command again."""
     again = subprocess.run(command, env=environment, cwd=ROOT, capture_output=True, text=True, timeout=LONGEST)
     if (again.returncode, again.stderr) != (0, ""):
-        return [f"does not go on: exit code {again.returncode}: {again.stderr!r}"]
+        return [f"does not continue: exit code {again.returncode}: {again.stderr!r}"]
     result, expected = _digest(again.stdout), undisturbed()
-    return [] if result == expected else [f"digest {result} when it has gone on, expected {expected}"]
+    return [] if result == expected else [f"digest {result} after continuation, expected {expected}"]
 
 
 @cache
 def undisturbed() -> str:
-    """The digest of a campaign to which nothing is done."""
+    """Return the digest of a campaign without a fault."""
     with TemporaryDirectory() as folder:
         command = [sys.executable, "-m", "lapwing", *COMMAND, "--out", f"{folder}/out"]
         flight = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=LONGEST)
         return _digest(flight.stdout)
 
 
-def _digest(said: str) -> str:
-    result = re.search(r"^digest +([0-9a-f]{32})$", said, re.MULTILINE)
-    assert result, said
+def _digest(text: str) -> str:
+    result = re.search(r"^digest +([0-9a-f]{32})$", text, re.MULTILINE)
+    assert result, text
     return result[1]
 
 
 def _workers(folder: Path) -> list[int]:
-    """The numbers of a campaign's worker processes."""
+    """Return the ids of a campaign's worker processes."""
     result = []
     for process in sorted(leak_checks.of_trial(folder)):
         with suppress(OSError):

@@ -1,8 +1,8 @@
-"""Hostile trial with a seed: signals at random moments, broken environments and too little memory, within a time.
+"""Trials with signals at random times, broken environments and too little memory, within a time limit.
 
     python -m tests.faults.chaos [--seed S] [--seconds 600] [--signals 200] [--environments 60] [--memory 10] [--jobs J]
 
-Prints each trial that went wrong, and how many of each kind were tried and right. Exit code 1 if one went wrong.
+Prints each failed trial, and the numbers of tried and successful trials by kind. Exit code 1 if a trial failed.
 """
 
 import argparse
@@ -15,15 +15,15 @@ from concurrent.futures import ThreadPoolExecutor
 from tests.faults import environments, memory_pressure, trial
 
 SIGNALS = ("kill", "terminate", "freeze", "pause", "Ctrl-C")
-SHARE, ENVIRONMENTS = 0.7, 0.9  # of the time by which signals and environments end
-LATEST = 5.0  # [s] after the start of its processes at which a run is struck
-TIMEOUT = 180.0  # [s] for the end of a trial on a busy machine
+SHARE, ENVIRONMENTS = 0.7, 0.9  # of the time, until which signals and environments are tried
+LATEST = 5.0  # [s] from the start of the processes to the fault
+TIMEOUT = 180.0  # [s] until a trial must end on a busy machine
 
 Result = tuple[str, str, list[str]]  # kind, description, faults
 
 
 def signalled(seed: int) -> Result:
-    """Carry out the trial of a seed."""
+    """Run the signal trial of a seed."""
     drawn = trial.draw(seed, SIGNALS)
     drawn = drawn._replace(scene="hover" if seed % 4 else drawn.scene, delay=drawn.delay * LATEST / trial.LATEST)
     outcome = trial.fly(drawn, TIMEOUT)
@@ -31,19 +31,19 @@ def signalled(seed: int) -> Result:
 
 
 def broken(seed: int) -> Result:
-    """Run in the environment of a seed."""
+    """Run in the environment that a seed selects."""
     outcome = environments.fly(seed, TIMEOUT)
     return "environment", outcome.name, outcome.wrong
 
 
 def starved(seed: int) -> Result:
-    """Run with the memory of a seed."""
+    """Run with the memory limit that a seed selects."""
     outcome = memory_pressure.fly(seed, TIMEOUT)
     return "memory", outcome.name, outcome.wrong
 
 
 def trials(attempt: Callable[[int], Result], seeds: range, jobs: int, until: float) -> Iterator[tuple[int, Result]]:
-    """Yield the results of as many seeds as the time allows."""
+    """Yield the results by seed until the time `until`."""
 
     def in_time(seed: int) -> Result | None:
         return attempt(seed) if time.monotonic() < until else None
@@ -55,7 +55,7 @@ def trials(attempt: Callable[[int], Result], seeds: range, jobs: int, until: flo
 
 
 def main() -> None:
-    """Try, print and count."""
+    """Run the trials, print failures and counts."""
     parser = argparse.ArgumentParser(description="Signals at random moments and broken environments.")
     parser.add_argument("--seed", type=int, default=1)
     parser.add_argument("--seconds", type=float, default=600.0, help="for all trials")

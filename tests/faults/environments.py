@@ -1,4 +1,4 @@
-"""Broken environments: a short run in each of them ends with its digest, or with one line that names the cause."""
+"""Broken environments: a short run in each ends with its digest, or with one line that names the cause."""
 
 import os
 import random
@@ -58,7 +58,7 @@ NEEDS_ROOT = ("read-only disk", "small disk")
 
 
 class Outcome(NamedTuple):
-    """A trial and its faults."""
+    """Result of a trial."""
 
     name: str
     code: int
@@ -66,7 +66,7 @@ class Outcome(NamedTuple):
 
 
 def fly(seed: int, timeout: float) -> Outcome:
-    """Run in the environment of a seed; each environment has its turn."""
+    """Run in the environment that a seed selects; consecutive seeds cycle through all environments."""
     chance = random.Random(f"environment {seed}")
     names = [name for name in SCRIPTS if os.geteuid() == 0 or name not in NEEDS_ROOT]
     name = names[seed % len(names)]
@@ -89,7 +89,7 @@ def fly(seed: int, timeout: float) -> Outcome:
 
 
 def ended_properly(done: "subprocess.CompletedProcess[str]") -> list[str]:
-    """Return faults of the end of a run: a traceback, another digest, more than one line."""
+    """Return the errors at the end of a run: a traceback, another digest, more than one line."""
     if "Traceback" in done.stderr:
         return [f"a traceback: {done.stderr[-300:]}"]
     if done.returncode == 0:

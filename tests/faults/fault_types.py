@@ -9,20 +9,20 @@ from contextlib import suppress
 from typing import NamedTuple
 
 LAUNCHER = "launcher"
-PAUSE = 1.0  # [s] that a flight must wait for
-FROZEN = 30.0  # [s] after which a launcher that was frozen is let go on
+PAUSE = 1.0  # [s] of a stopped process that a flight must survive
+FROZEN = 30.0  # [s] until a frozen launcher is resumed
 
 
 FULL = "full disk"
 TERMINATE = "terminate"
-INTERRUPT = "Ctrl-C"  # at any moment; where the seed is odd nothing is compiled yet
+INTERRUPT = "Ctrl-C"  # at any time; with an odd seed, the kernel cache is empty
 
 
 class Kind(NamedTuple):
     """A kind of fault."""
 
-    strike: Callable[[int], None]  # at a process
-    # what is wrong with an end: (victim, exit code, standard error); "" if nothing
+    strike: Callable[[int], None]  # applies the fault to a process id
+    # error in the end of a run: (victim, exit code, standard error); "" without error
     ends: Callable[[str, int, str], str]
 
 
@@ -45,7 +45,7 @@ def pause(pid: int) -> None:
 
 
 def starve(pid: int) -> None:
-    """For a while the process gets a tenth of the time."""
+    """Limit a process to a tenth of the processor time for 2 s."""
     for _ in range(20):
         _send(pid, signal.SIGSTOP)
         time.sleep(0.09 * PAUSE)
@@ -66,35 +66,35 @@ def _send(pid: int, number: int) -> None:
         os.kill(pid, number)
 
 
-def _flies_on(victim: str, code: int, said: str) -> str:
-    return "" if (code, said) == (0, "") else f"expected a flight to its end, got exit code {code}: {said}"
+def _flies_on(victim: str, code: int, text: str) -> str:
+    return "" if (code, text) == (0, "") else f"expected a flight to its end, got exit code {code}: {text}"
 
 
 def _named(pattern: str) -> Callable[[str, int, str], str]:
-    def check(victim: str, code: int, said: str) -> str:
+    def check(victim: str, code: int, text: str) -> str:
         expected = pattern.replace("VICTIM", victim)
-        if code == 1 and re.fullmatch(rf"lapwing: {expected}.*\n", said):
+        if code == 1 and re.fullmatch(rf"lapwing: {expected}.*\n", text):
             return ""
-        return f"expected exit code 1 and {expected!r}, got {code}: {said!r}"
+        return f"expected exit code 1 and {expected!r}, got {code}: {text!r}"
 
     return check
 
 
-def _no_space(victim: str, code: int, said: str) -> str:
-    right = code == 2 and said.startswith("lapwing: ") and "no space left" in said.lower() and said.count("\n") == 1
-    return "" if right else f"expected exit code 2 and that there is no space left, got {code}: {said!r}"
+def _no_space(victim: str, code: int, text: str) -> str:
+    right = code == 2 and text.startswith("lapwing: ") and "no space left" in text.lower() and text.count("\n") == 1
+    return "" if right else f"expected exit code 2 and that there is no space left, got {code}: {text!r}"
 
 
-def _interrupted(victim: str, code: int, said: str) -> str:
-    right = (code, said) == (130, "lapwing: ended by SIGINT\n")
-    return "" if right else f"expected exit code 130 and one line, got {code}: {said!r}"
+def _interrupted(victim: str, code: int, text: str) -> str:
+    right = (code, text) == (130, "lapwing: ended by SIGINT\n")
+    return "" if right else f"expected exit code 130 and one line, got {code}: {text!r}"
 
 
-def _terminated(victim: str, code: int, said: str) -> str:
+def _terminated(victim: str, code: int, text: str) -> str:
     if victim != LAUNCHER:
-        return _named(r"VICTIM ended unexpectedly \(signal 15\)")(victim, code, said)
-    right = (code, said) == (143, "lapwing: ended by SIGTERM\n")
-    return "" if right else f"expected exit code 143 and one line, got {code}: {said!r}"
+        return _named(r"VICTIM ended unexpectedly \(signal 15\)")(victim, code, text)
+    right = (code, text) == (143, "lapwing: ended by SIGTERM\n")
+    return "" if right else f"expected exit code 143 and one line, got {code}: {text!r}"
 
 
 KINDS = {

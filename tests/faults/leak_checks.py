@@ -15,7 +15,7 @@ TABLES = ("tcp", "tcp6", "udp", "udp6", "unix")
 
 
 def of_trial(folder: Path) -> dict[int, str]:
-    """Return the processes of a trial by number: those with its folder in environment or command line."""
+    """Return the names of a trial's processes by id: those with its folder in environment or command line."""
     result, mark = {}, os.fsencode(folder)
     for place in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):
@@ -27,7 +27,7 @@ def of_trial(folder: Path) -> dict[int, str]:
 
 
 def ports(processes: Iterable[int]) -> dict[str, str]:
-    """The sockets at which processes listen or may be spoken to: what they are, by inode."""
+    """Return the sockets at which processes listen or receive, by inode."""
     inodes = set()
     for process in processes:
         with suppress(OSError):
@@ -38,14 +38,14 @@ def ports(processes: Iterable[int]) -> dict[str, str]:
 
 
 def _bound() -> dict[str, str]:
-    """Every socket of this machine with an address of its own that nobody is connected to, by inode."""
+    """Return every bound socket of this machine without a peer, by inode."""
     result = {}
     for table in TABLES:
         with suppress(OSError):
             for line in Path(f"/proc/net/{table}").read_text().splitlines()[1:]:
                 words = line.split()
                 if table == "unix":
-                    if len(words) > 7 and int(words[3], 16) & 0x10000:  # it listens
+                    if len(words) > 7 and int(words[3], 16) & 0x10000:  # listening
                         result[words[6]] = f"{table} {words[7]}"
                 elif words[3] == ("0A" if table.startswith("tcp") else "07"):
                     result[words[9]] = f"{table} port {int(words[1].rpartition(':')[2], 16)}"
@@ -53,7 +53,7 @@ def _bound() -> dict[str, str]:
 
 
 def ended(process: subprocess.Popen, name: str, seconds: float) -> list[str]:
-    """Return a problem if a process has not ended in time; end it."""
+    """Wait for a process; kill it and return an error if it has not ended after `seconds`."""
     try:
         process.wait(seconds)
     except subprocess.TimeoutExpired:
@@ -64,12 +64,12 @@ def ended(process: subprocess.Popen, name: str, seconds: float) -> list[str]:
 
 
 def left(folder: Path, taken: dict[str, str], cache: Path | None, seconds: float) -> list[str]:
-    """Return the leaks that remain after a time; empty if there are none.
+    """Return the leaks that remain after `seconds`.
 
     Args:
         folder: folder of the trial.
-        taken: previous ports of its processes.
-        cache: its kernel cache; None: the shared one.
+        taken: ports that its processes had.
+        cache: its kernel cache, or None for the shared cache.
         seconds: time to wait.
     """
     deadline = time.monotonic() + seconds
@@ -88,7 +88,7 @@ def _left(folder: Path, taken: dict[str, str], cache: Path | None) -> list[str]:
 
 
 def locked(cache: Path) -> list[str]:
-    """The locks of a kernel cache that are held, and by nobody else who is there: others may compile in it, too."""
+    """Return the held locks of a kernel cache whose holder has ended; other programs may use the cache too."""
     result, holders = [], _holders()
     for path in sorted((cache / LOCKS).glob("*")):
         with suppress(OSError):
@@ -104,6 +104,6 @@ def locked(cache: Path) -> list[str]:
 
 
 def _holders() -> dict[int, str]:
-    """Return the holders of each file lock, by the file's inode."""
+    """Return the holder of each file lock, by the file's inode."""
     lines = [line.split() for line in Path("/proc/locks").read_text().splitlines()]
     return {int(words[5].rpartition(":")[2]): words[4] for words in lines if words[1] == "FLOCK"}

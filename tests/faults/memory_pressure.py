@@ -1,7 +1,7 @@
 """Runs with too little memory: in a memory cgroup with a limit, where the kernel kills a process.
 
-The launcher names the process that was killed; where the kernel has to take the launcher itself, nothing is said. In
-both cases nothing is left.
+The launcher names the killed process; there is no message if the kernel kills the launcher itself. In both cases
+nothing is left behind.
 """
 
 import os
@@ -32,7 +32,7 @@ def available() -> bool:
 
 
 def fly(seed: int, timeout: float) -> Outcome:
-    """Run with the memory of a seed."""
+    """Run with the memory limit that a seed selects."""
     limit = random.Random(f"memory {seed}").randint(*LIMITS)
     name = f"{limit} MB of memory"
     group = _create(f"lapwing-chaos-{os.getpid()}-{seed}", limit)
@@ -60,7 +60,7 @@ def fly(seed: int, timeout: float) -> Outcome:
 
 
 def _create(name: str, limit: int) -> Path:
-    """Return a new group with a limit [MB]. Raises OSError if that is not permitted."""
+    """Return a new group with a limit [MB]. Raise OSError if that is not permitted."""
     old = (GROUPS / "memory.limit_in_bytes").exists()
     group = (GROUPS if old else UNIFIED) / name
     if not old and not (UNIFIED / "cgroup.controllers").exists():
@@ -75,7 +75,7 @@ def _create(name: str, limit: int) -> Path:
 
 
 def _emptied(group: Path, timeout: float) -> str:
-    """Return the ids of processes that are in a group after a time [s], "" if none is."""
+    """Return the ids of the processes that remain in a group after at most `timeout` [s]."""
     deadline = time.monotonic() + timeout
     while (left := " ".join((group / "cgroup.procs").read_text().split())) and time.monotonic() < deadline:
         time.sleep(0.1)

@@ -1,11 +1,10 @@
-"""Many short runs at once on a busy machine: each has to end by itself, with a complete log.
+"""Many short runs at once on a busy machine: each must end without a signal and with a complete log.
 
     python -m tests.faults.stress --runs 2000 --at-once 6 --load 5 [--seconds 3000]
 
-Takes turns at the `KINDS` of runs. Every log must have the digest that the same scene has in one process, to which
-every message counts, and a run prints no line of a fault. `--load` is the number of processes that do nothing but keep
-a processor busy. Prints a line per batch; after `--seconds` no further run starts. Exit code 1 if a run fails, prints
-a fault, or its log lacks a message.
+Cycles through the `KINDS` of runs. Every log must have the digest of the same scene in one process, which covers every
+message, and a run must not print a fault. `--load` is the number of processes that only keep a processor busy. Prints a
+line per batch; no run starts after `--seconds`. Exit code 1 if a run fails, prints a fault, or its log lacks a message.
 """
 
 import argparse
@@ -27,7 +26,7 @@ from typing import NamedTuple
 from lapwing.cosim.log import LogReader
 
 LAPWING = [sys.executable, "-m", "lapwing"]
-MAVLINK = ["--mavlink", "udpout:127.0.0.1:9", "--speed", "max"]  # the port that discards
+MAVLINK = ["--mavlink", "udpout:127.0.0.1:9", "--speed", "max"]  # the discard port
 FLEET = ["formation", "--set", "run.duration=0.3", "--set", "success.require=[]"]  # too short for a landing
 KINDS = {
     "hover": ["hover", "--set", "run.duration=4"],
@@ -36,8 +35,8 @@ KINDS = {
     "fleet with MAVLink": [*FLEET, *MAVLINK],
 }
 TIMEOUT = 900.0  # [s] for one run
-BATCH = 20  # runs in a line of progress
-FAULT = re.compile(r"ended before|unexpectedly|confirm|rejected:|incomplete")  # in the output of a run
+BATCH = 20  # runs per line of progress
+FAULT = re.compile(r"ended before|unexpectedly|confirm|rejected:|incomplete")  # in the output of a failed run
 
 
 class Result(NamedTuple):
@@ -45,7 +44,7 @@ class Result(NamedTuple):
 
     kind: str
     seconds: float
-    wrong: str  # "" where nothing is
+    wrong: str  # "" without error
     lost: int = 0  # messages that the log lacks
 
 
@@ -62,9 +61,9 @@ class Recorded(NamedTuple):
 
 
 def reference(kind: str, folder: Path) -> Recorded:
-    """The log of a kind of run, flown in one process; compiles what the runs need.
+    """Fly a kind of run in one process, which also compiles its kernels. Return the content of its log.
 
-    A link belongs to runs in processes only: there the log of one is flown again in one process, to the same digest.
+    MAVLink needs several processes: such a log is resimulated in one process to the same digest.
     """
     options, log = KINDS[kind], folder / f"{kind}.mcap"
     mode = [] if "--mavlink" in options else ["--mode", "single-process"]
@@ -77,7 +76,7 @@ def reference(kind: str, folder: Path) -> Recorded:
 
 
 def fly(kind: str, expected: Recorded, folder: Path, number: int) -> Result:
-    """One run, whose log is to be as `expected`."""
+    """Run once and compare the log with `expected`."""
     log, figures = folder / f"{number}.mcap", folder / f"{number}.json"
     command = [*LAPWING, "run", *KINDS[kind], "--log", str(log), "--json", str(figures)]
     began = time.monotonic()
@@ -110,7 +109,7 @@ def busy(processes: int) -> Iterator[None]:
 
 
 def trial(runs: int, at_once: int, load: int, seconds: float = float("inf")) -> Iterator[Result]:
-    """So many runs, so many at once, beside so many processes that keep a processor busy; fewer if time is short."""
+    """Yield the results of `runs`, `at_once` at a time beside `load` busy processes; start none after `seconds`."""
     until = time.monotonic() + seconds
     with tempfile.TemporaryDirectory(prefix="stress-") as name:
         folder = Path(name)
@@ -127,7 +126,7 @@ def trial(runs: int, at_once: int, load: int, seconds: float = float("inf")) -> 
 
 
 def main() -> None:
-    """Fly them, and count."""
+    """Run the trials and print the counts."""
     parser = argparse.ArgumentParser(description="Many short runs at once on a busy machine.")
     parser.add_argument("--runs", type=int, default=60)
     parser.add_argument("--at-once", type=int, default=6)

@@ -1,4 +1,4 @@
-"""A few of the runs with faults; `python -m tests.faults` has as many as one likes."""
+"""Some runs with faults; `python -m tests.faults` runs any number of them."""
 
 import os
 import subprocess
@@ -39,14 +39,14 @@ def test_fault_ends_run_as_specified(trial):
     assert not outcome.wrong, outcome
 
 
-def test_seed_makes_same_trial():
+def test_trial_depends_on_seed_only():
     assert draw(7) == draw(7)
     assert len({draw(seed).kind for seed in range(40)}) >= 4
     assert draw(7, [campaign.KILL]).scene == "hover"
 
 
 def test_leftovers_of_trial_are_detected(tmp_path):
-    """A process of it, the port at which it listens, and a lock that it has taken."""
+    """Detect a process of the trial, its listening port and its lock."""
     (tmp_path / "cache" / leak_checks.LOCKS).mkdir(parents=True)
     lock = tmp_path / "cache" / leak_checks.LOCKS / "kernel"
     with subprocess.Popen([sys.executable, "-c", HOLDS, lock], stdout=subprocess.PIPE, text=True) as holder:
@@ -56,7 +56,7 @@ def test_leftovers_of_trial_are_detected(tmp_path):
         there = leak_checks.left(tmp_path, taken, tmp_path / "cache", 0.0)
         holder.kill()
     assert there[0].startswith(f"process {holder.pid} ")
-    assert there[1:] == [f"tcp port {port} stays taken"]  # the lock's holder is there, and named by its number
+    assert there[1:] == [f"tcp port {port} stays taken"]  # no lock: its holder is alive
     assert leak_checks.left(tmp_path, taken, tmp_path / "cache", 10.0) == []
 
 

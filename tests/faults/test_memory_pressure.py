@@ -1,4 +1,4 @@
-"""A run that the kernel takes a process from names it, and leaves nothing behind."""
+"""A run names the process that the kernel killed, and leaves nothing behind."""
 
 import pytest
 
@@ -11,5 +11,5 @@ pytestmark = [
 
 
 @pytest.mark.parametrize("seed", range(3))
-def test_run_without_memory_names_killed_process(seed):
+def test_run_with_little_memory_names_killed_process(seed):
     assert memory_pressure.fly(seed, 180.0).wrong == []

@@ -1,4 +1,4 @@
-"""One run with one fault, and what is wrong with its end."""
+"""One run with one fault, and the errors in its end."""
 
 import os
 import random
@@ -27,10 +27,10 @@ SCENES = {  # overrides that make a flight of a few seconds
     "cooperative_load": ["run.duration=5"],
     "gyrostat_attitude": ["run.duration=5"],
 }
-LATEST = 9.0  # [s] after the start of its first process at which a run is struck
-TIMEOUT = 60.0  # [s] for a run to end after that, and for its processes, on a machine that does nothing else
-DISK = 1 << 24  # [bytes] of a disk that is filled
-RECOVERED = 0.5  # [s] before the fault up to which a log must be whole
+LATEST = 9.0  # [s] from the start of the first process to the fault
+TIMEOUT = 60.0  # [s] from the fault to the end of the run, and of its processes, on an idle machine
+DISK = 1 << 24  # [bytes] of the disk that is filled
+RECOVERED = 0.5  # [s] before the fault, up to which a log must be complete
 
 
 class Trial(NamedTuple):
@@ -39,8 +39,8 @@ class Trial(NamedTuple):
     seed: int
     scene: str
     kind: str
-    place: float  # which of the participants, in [0, 1); 1: the launcher
-    delay: float  # [s] after the first process has started; of Ctrl-C after the launcher has
+    place: float  # participant, in [0, 1); 1: the launcher
+    delay: float  # [s] after the start of the first process; Ctrl-C: of the launcher
 
 
 class Outcome(NamedTuple):
@@ -48,13 +48,13 @@ class Outcome(NamedTuple):
 
     victim: str
     code: int
-    said: str
+    text: str
     seconds: float  # from the fault to the end of the last process
     wrong: list[str]
 
 
 def draw(seed: int, kinds: Sequence[str] | None = None) -> Trial:
-    """The trial of a seed, of one of these kinds; None: of those that a seed has drawn from ever since."""
+    """Return the trial of a seed; `kinds` are the kinds to choose from, None for all."""
     chance = random.Random(seed)
     every = [*KINDS, *network_partition.KINDS] if os.geteuid() == 0 else [kind for kind in KINDS if kind != FULL]
     kind = chance.choice(kinds or every)
@@ -65,7 +65,7 @@ def draw(seed: int, kinds: Sequence[str] | None = None) -> Trial:
 
 
 def fly(trial: Trial, timeout: float = TIMEOUT) -> Outcome:
-    """Carry a trial out in a folder of its own; `timeout` [s] is what its end may take."""
+    """Run a trial in a new folder; `timeout` [s] limits the time from the fault to the end."""
     folder = Path(tempfile.mkdtemp(prefix="faults-"))
     disk = folder / "disk"
     disk.mkdir()
@@ -107,7 +107,7 @@ def _fly(trial: Trial, folder: Path, log: Path, timeout: float) -> Outcome:
         time.sleep(trial.delay)
         children = participants(launcher.pid)
         everybody = {**children, LAUNCHER: launcher.pid}
-        names = [name for name in sorted(children) if name in _needed(trial.scene)]  # others are there at first
+        names = [name for name in sorted(children) if name in _needed(trial.scene)]  # the others end early
         victim = names[int(trial.place * len(names))] if trial.place < 1.0 and names else LAUNCHER
         late = launcher.poll() is not None
         taken = leak_checks.ports(leak_checks.of_trial(folder))
@@ -138,26 +138,26 @@ def _fly(trial: Trial, folder: Path, log: Path, timeout: float) -> Outcome:
     return Outcome(victim, code, text.strip(), seconds, wrong)
 
 
-def _wrong_end(trial: Trial, victim: str, code: int, said: str, late: bool) -> list[str]:
-    over = (code, said) == (0, "")  # it was at its end when it was struck
-    if "Traceback" in said:
-        return [f"a traceback: {said}"]
+def _wrong_end(trial: Trial, victim: str, code: int, text: str, late: bool) -> list[str]:
+    over = (code, text) == (0, "")  # it ended before the fault
+    if "Traceback" in text:
+        return [f"a traceback: {text}"]
     if victim == LAUNCHER and trial.kind == "kill":
         return [] if code == -signal.SIGKILL or (late and over) else [f"exit code {code}"]
     if victim == LAUNCHER and trial.kind == "freeze":
-        return [] if code in (0, 1) else [f"exit code {code}: {said}"]
-    result = KINDS[trial.kind].ends(victim, code, said)
+        return [] if code in (0, 1) else [f"exit code {code}: {text}"]
+    result = KINDS[trial.kind].ends(victim, code, text)
     return [result] if result and not over else []
 
 
-def _wrong_log(trial: Trial, victim: str, log: Path, said: str, late: bool) -> list[str]:
-    """The log opens, and holds what was flown up to shortly before the fault."""
-    _, _, stated = said.partition("at t = ")
+def _wrong_log(trial: Trial, victim: str, log: Path, text: str, late: bool) -> list[str]:
+    """Return an error unless the log opens and reaches to `RECOVERED` before the fault."""
+    _, _, stated = text.partition("at t = ")
     flight = float(stated.split()[0].rstrip(":;,")) if stated else 0.0
-    if victim == "recorder":  # the others fly on until somebody waits, and the time is theirs
+    if victim == "recorder":  # the others continue until one waits, and the time is theirs
         flight = min(flight, RECOVERED)
     if flight < RECOVERED and not (trial.kind == INTERRUPT and log.exists()):
-        return []  # there may be none
+        return []  # a log may be missing
     try:
         with LogReader(log) as read:
             last = max((time_ns for _, _, time_ns, _ in read.messages()), default=0) * 1e-9
@@ -168,19 +168,19 @@ def _wrong_log(trial: Trial, victim: str, log: Path, said: str, late: bool) -> l
 
 @cache
 def _needed(scene: str) -> list[str]:
-    """The processes of the run of a scene of a trial."""
+    """Return the required processes of a scene."""
     return required_processes(resolve(load(scene, SCENES[scene])))
 
 
 def _fill(path: Path) -> None:
-    """Leave no space on a disk."""
+    """Fill a disk."""
     with suppress(OSError), path.open("wb", buffering=0) as file:
         while True:
             file.write(bytes(4096))
 
 
 def _gone(pids: dict[str, int], seconds: float) -> list[str]:
-    """Return the processes that remain after a time."""
+    """Return the processes that remain after at most `seconds`."""
     deadline = time.monotonic() + seconds
     while (left := [name for name, pid in pids.items() if running(pid)]) and time.monotonic() < deadline:
         time.sleep(0.05)

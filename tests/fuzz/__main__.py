@@ -1,8 +1,8 @@
-"""Damaged bytes for everything that reads bytes from outside.
+"""Damaged bytes for all readers of external bytes.
 
     python -m tests.fuzz [--inputs N | --seconds S] [--seed S] [TARGET ...]
 
-Exit code 1 if an input raises another exception than ValueError, or takes longer than a second of processor time.
+Exit code 1 if an input raises an exception other than ValueError, or takes longer than a second of processor time.
 """
 
 import argparse
@@ -17,7 +17,7 @@ SLOW = 1.0  # [s] of processor time for one input
 
 
 def main() -> None:
-    """Try, and count."""
+    """Run the inputs and print the counts."""
     parser = argparse.ArgumentParser(description="Damaged bytes for everything that reads bytes from outside.")
     parser.add_argument("--inputs", type=int, default=1000, help="for each target")
     parser.add_argument("--seconds", type=float, help="of processor time for each target, instead of --inputs")
@@ -27,7 +27,7 @@ def main() -> None:
     wrong = 0
     for name in values.targets or TARGETS:
         target, chance = TARGETS[name](), random.Random(f"{name} {values.seed}")
-        for seed in target.seeds:  # what is loaded once is not counted
+        for seed in target.seeds:  # loads modules before the memory is measured
             target.read(seed)
         refused, slowest = 0, 0.0
         before = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss

@@ -1,4 +1,4 @@
-"""Recorded flights of other programs, read by `lapwing import`: seeds are short flights."""
+"""Flight logs of other programs, read by `lapwing import`; the seeds are short flights."""
 
 import struct
 from collections.abc import Callable

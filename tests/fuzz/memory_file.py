@@ -1,4 +1,4 @@
-"""Files in memory, which are ten times as fast as those on a disk."""
+"""Files in memory, ten times as fast as files on a disk."""
 
 import atexit
 import os
@@ -16,7 +16,7 @@ def _folder() -> Path:
 
 @cache
 def _file(name: str) -> tuple[int, Path]:
-    descriptor, path = os.memfd_create(name), _folder() / name  # readers go by the ending
+    descriptor, path = os.memfd_create(name), _folder() / name  # readers depend on the file name extension
     path.symlink_to(f"/proc/{os.getpid()}/fd/{descriptor}")
     return descriptor, path
 

@@ -1,4 +1,4 @@
-"""Damage to bytes, as chance or somebody with bad intentions does it."""
+"""Random and malicious damage to bytes."""
 
 import random
 
@@ -12,7 +12,7 @@ CUTS = (1, 2, 4, 8, 64, MOST)  # [bytes]
 
 
 def mutated(chance: random.Random, seeds: tuple[bytes, ...]) -> bytes:
-    """A seed with a few places damaged; now and then nothing but noise."""
+    """Return a seed with damage in a few places; occasionally only noise."""
     draw = chance.random  # an index of n is int(n * draw()): five times as fast as `choice` and `randrange`
     if draw() < 0.02:
         return chance.randbytes(int(600 * draw()))

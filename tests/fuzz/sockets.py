@@ -19,27 +19,27 @@ from tests.fuzz.mutate import MOST
 from tests.fuzz.target import Target
 from tests.services.foxglove.client import Client
 
-CONVERSATION = 64  # inputs that one endpoint sends before the next comes
-UNANSWERED = 1024  # requests before an answer is awaited, which takes two turns of the processor
-STEP = 100_000_000  # [ns] of simulated time from one to the next
-_LONGEST_HEAD = 14  # [bytes] of a frame
+CONVERSATION = 64  # inputs per endpoint
+UNANSWERED = 1024  # requests between two answers, each of which takes two context switches
+STEP = 100_000_000  # [ns] of simulated time between two endpoints
+_LONGEST_HEAD = 14  # [bytes] of a frame's head
 _SENDER = bytes([255, 190])  # system and component of a ground station
 
 
 def _conversations() -> Callable[[bytes], None]:
-    """Gives bytes to a vehicle, of which estimates come, as those of one endpoint after the other."""
+    """Return a function that sends bytes to a vehicle from consecutive endpoints; each starts with an estimate."""
     adapter = Adapter(describe(scene_resolver.load("hover")), lambda command: None)
-    now = SimpleNamespace(endpoint=None, count=0)
+    state = SimpleNamespace(endpoint=None, count=0)
 
     def read(data: bytes) -> None:
-        if now.count % CONVERSATION == 0:
-            if now.endpoint:
-                adapter.disconnect(now.endpoint)
-            time_ns = now.count // CONVERSATION * STEP
+        if state.count % CONVERSATION == 0:
+            if state.endpoint:
+                adapter.disconnect(state.endpoint)
+            time_ns = state.count // CONVERSATION * STEP
             adapter.handle(ESTIMATE, time_ns, Estimate(header(time_ns, "world")).encode(), time_ns * 1e-9)
-            now.endpoint = adapter.connect(True, True, lambda sent: None)
-        now.count += 1
-        adapter.receive(now.endpoint, data)
+            state.endpoint = adapter.connect(True, True, lambda sent: None)
+        state.count += 1
+        adapter.receive(state.endpoint, data)
 
     return read
 
@@ -53,7 +53,7 @@ def link() -> Target:
 
 
 def frames() -> Target:
-    """Frames with a sound checksum of the messages that have a handler, with any payload."""
+    """Frames with a valid checksum and any payload, for the messages that have a handler."""
     numbers, receive = sorted(handlers()), _conversations()
 
     def read(data: bytes) -> None:
@@ -68,7 +68,7 @@ def frames() -> Target:
 
 
 def page() -> Target:
-    """Requests to the page of `lapwing run --view`: what its guard makes of a path and headers."""
+    """Paths and headers of requests to the guard of the page of `lapwing run --view`."""
     guard = Guard("token", None)
     guard.hosts = {"127.0.0.1:8000"}
     guard.handler = lambda connection, request: None
@@ -91,8 +91,8 @@ def page() -> Target:
 
 
 def _server() -> Server:
-    """One with a topic, to the end of the process."""
-    os.environ.setdefault("TOKIO_WORKER_THREADS", "1")  # one client at a time: two thirds of the processor time
+    """Return a server with a topic, which runs until the end of the process."""
+    os.environ.setdefault("TOKIO_WORKER_THREADS", "1")  # enough for one client, in two thirds of the processor time
     server = Server("127.0.0.1:0").__enter__()
     atexit.register(server.__exit__)
     server.declare("/drone1/estimate", ESTIMATE.message.type_name)
@@ -120,38 +120,38 @@ def _missing(data: bytes) -> int:
 
 
 def websocket() -> Target:
-    """Frames of a client of `--foxglove`: the server answers what follows, or sends the client away, who comes again.
+    """Frames of a client of `--foxglove`: the server answers, or closes the connection and accepts another.
 
-    The rest of a frame that is too short is sent, too, so that the server reads it, and a connection takes many.
+    Short frames are padded, so that the server reads them and a connection serves many inputs.
     """
     server = _server()
-    now = SimpleNamespace(client=Client(server.port))
+    state = SimpleNamespace(client=Client(server.port))
 
     def read(data: bytes) -> None:
         missing = _missing(data)
         if missing > MOST:
-            now.client.end(data)
-        elif now.client.outlives(data + bytes(missing)):
+            state.client.end(data)
+        elif state.client.outlives(data + bytes(missing)):
             return
-        now.client.close()
-        now.client = Client(server.port)
+        state.client.close()
+        state.client = Client(server.port)
 
     frames = [bytes([0x81, 0x80 | len(text), *bytes(4)]) + text for text in _TEXTS]
     return Target(read, (*frames, bytes([0x82, 0x80 | len(_BINARY), *bytes(4)]) + _BINARY))
 
 
 def requests() -> Target:
-    """Yield the payloads in valid frames, so that the server reads all of them; the first byte selects the kind."""
+    """Payloads in valid frames, so that the server reads all of them; the first byte selects the kind."""
     server = _server()
-    now = SimpleNamespace(client=Client(server.port), sent=0)
+    state = SimpleNamespace(client=Client(server.port), sent=0)
 
     def read(data: bytes) -> None:
         kind, output = 0x82, data[1:]
-        if data[:1] < b"\x80":  # a text that is no UTF-8 ends the connection: `websocket` tries those
+        if data[:1] < b"\x80":  # invalid UTF-8 closes the connection: `websocket` sends such texts
             kind, output = 0x81, output.decode(errors="replace").encode()
-        now.client.send(bytes([kind, 0xFE]) + len(output).to_bytes(2, "big") + bytes(4) + output)
-        now.sent += 1
-        if now.sent % UNANSWERED == 0 and not now.client.outlives(b""):
+        state.client.send(bytes([kind, 0xFE]) + len(output).to_bytes(2, "big") + bytes(4) + output)
+        state.sent += 1
+        if state.sent % UNANSWERED == 0 and not state.client.outlives(b""):
             raise ConnectionError("the server does not answer")
 
     return Target(read, (*(b"\0" + text for text in _TEXTS), b"\xff" + _BINARY))

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 
 class Target(NamedTuple):
-    """Something that reads, and what it reads when all is well."""
+    """Reader and its valid inputs."""
 
     read: Callable[[bytes], object]
     seeds: tuple[bytes, ...]

@@ -21,7 +21,7 @@ from tests.fuzz.sockets import frames, link, page, requests, websocket
 from tests.fuzz.target import Target
 
 SCENES = Path("lapwing/scenes")
-SMALL_SCENES = (  # of which more are tried in a second than of those that ship
+SMALL_SCENES = (  # faster to read than the shipped files
     b"""run = { duration = 2.0 }
 vehicle.airframe = 'hexacopter'
 effects = { gravity = {}, rotor_thrust = {} }
@@ -137,7 +137,7 @@ def set_up_messages() -> Target:
 
 
 def origins() -> Target:
-    """Requests to the gate before the Foxglove server."""
+    """Requests to the access check of the Foxglove server."""
     request = b"GET / HTTP/1.1\r\nHost: 127.0.0.1:8765\r\nOrigin: https://app.foxglove.dev\r\n\r\n"
     return Target(lambda data: rejection_reason(data, "127.0.0.1"), (request,))
 

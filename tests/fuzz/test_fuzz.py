@@ -1,4 +1,4 @@
-"""Nothing but a ValueError comes of damaged bytes; `python -m tests.fuzz` tries more of them."""
+"""Readers of damaged bytes raise only ValueError; `python -m tests.fuzz` tries more inputs."""
 
 from functools import cache
 
@@ -18,7 +18,7 @@ def made(name):
 
 
 @pytest.mark.parametrize("name", TARGETS)
-def test_damaged_bytes_are_refused_or_read(name):
+def test_damaged_bytes_raise_only_value_error(name):
     target = made(name)
 
     @settings(max_examples=60, deadline=None, database=None, derandomize=True)

@@ -1,4 +1,4 @@
-"""Check the digests of all shipped scenes, or of those named; or write down what they are now."""
+"""Check or update the golden digests of all shipped scenes, or of the named ones."""
 
 import argparse
 import sys
@@ -13,7 +13,7 @@ from tests.golden.digests import BEGINNING, Golden
 
 
 def fly(case: Case) -> tuple[MemoryLog, str]:
-    """The whole flight of a case, and the digest of its beginning."""
+    """Return the complete flight of a case and the digest of its beginning."""
     setup = case.resolve()
     log, graph, beginning = MemoryLog(setup), BlockDiagram(setup, create_all(setup), PAGE), ""
     stops = [round(BEGINNING * setup.rate) + 1, *range(PAGE, setup.last_tick + 1 + PAGE, PAGE)]
@@ -29,11 +29,11 @@ def fly(case: Case) -> tuple[MemoryLog, str]:
 
 
 def main() -> int:
-    """The command."""
+    """Run the command."""
     parser = argparse.ArgumentParser(prog="python -m tests.golden", description=__doc__)
     parser.add_argument("scenes", metavar="SCENE", nargs="*", help=f"one of {', '.join(CASES)}; all if none is named")
-    parser.add_argument("--update", action="store_true", help="write down what they are now")
-    parser.add_argument("--reason", default="", help="why they change, for the file")
+    parser.add_argument("--update", action="store_true", help="store the present digests")
+    parser.add_argument("--reason", default="", help="reason for the change, for the file")
     values = parser.parse_args()
     for name in values.scenes:
         if name not in CASES:

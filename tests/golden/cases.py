@@ -1,4 +1,4 @@
-"""The flights whose digests are kept: every shipped scene, and a plan."""
+"""Flights with golden digests: every shipped scene, and a plan."""
 
 from pathlib import Path
 from typing import NamedTuple
@@ -20,7 +20,7 @@ class Case(NamedTuple):
     plan: Path | None = None
 
     def resolve(self) -> RunConfig:
-        """The set-up of the flight."""
+        """Return the run configuration of the flight."""
         scene = load(self.scene, list(self.overrides))
         if self.plan is None:
             return resolve(scene)
@@ -28,8 +28,8 @@ class Case(NamedTuple):
         return resolve(scene, {scene.lookup("vehicle.name"): commands})
 
 
-FOREIGN = ("ardupilot_quad", "betaflight_quad", "px4_quad")  # a firmware outside of the repository flies them
-OVERRIDES = {"groundstation": ("run.duration=5.0",)}  # of scenes that fly until they are stopped
+FOREIGN = ("ardupilot_quad", "betaflight_quad", "px4_quad")  # flown by a firmware that is not in the repository
+OVERRIDES = {"groundstation": ("run.duration=5.0",)}  # for scenes without an end
 CASES = {path.stem: Case(path, OVERRIDES.get(path.stem, ())) for path in sorted(SCENES.glob("*.toml"))}
 CASES = {name: case for name, case in CASES.items() if name not in FOREIGN}
 CASES["delivery.plan"] = Case(SCENES / "groundstation.toml", tuple(plan.OPERATED), SCENES / "plans" / "delivery.plan")

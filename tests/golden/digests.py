@@ -1,4 +1,4 @@
-"""The digests that are kept, one file: of each case, of the whole flight and of its beginning."""
+"""File of golden digests: for each case, of the complete flight and of its beginning."""
 
 import tomllib
 from pathlib import Path
@@ -13,18 +13,18 @@ HEAD = "# Digests of the shipped scenes; `python -m tests.golden` checks them, `
 class Golden(NamedTuple):
     """Expected digest of a case's flight."""
 
-    digest: str  # of the whole flight
+    digest: str  # of the complete flight
     beginning: str  # of the first BEGINNING s
-    reason: str  # why it is what it is
+    reason: str  # for its last change
 
 
 def read() -> dict[str, Golden]:
-    """All of the file."""
+    """Return the content of the file, by case."""
     return {name: Golden(**table) for name, table in tomllib.loads(FILE.read_text(encoding="utf-8")).items()}
 
 
 def write(known: dict[str, Golden]) -> None:
-    """Put the file anew."""
+    """Replace the file."""
     tables = []
     for name, golden in sorted(known.items()):
         entries = [f"{key} = {_text(value)}" for key, value in golden._asdict().items()]

@@ -1,4 +1,4 @@
-"""Shipped scenes fly to the digests that are kept: a few of them whole, all the others at their beginning."""
+"""Shipped scenes fly to their golden digests: some to the end, the others for their first second."""
 
 import math
 
@@ -19,7 +19,7 @@ def test_scene_flies_to_its_digest(name):
     log = fly(setup, last=None if whole else round(digests.BEGINNING * setup.rate))
     if log.digest != (golden.digest if whole else golden.beginning):
         result = thinned_log.first_difference(thinned_log.read(digests.sample_file(name)), log, whole)
-        pytest.fail("\n".join(["not the digest that is kept; `python -m tests.golden` tells more", *result]))
+        pytest.fail("\n".join(["differs from the golden digest; run `python -m tests.golden`", *result]))
 
 
 def test_every_golden_case_has_reason():
@@ -36,7 +36,7 @@ def flown():
 
 
 class Changed:
-    """A flight with some of its payloads changed: {(topic, number): payload}."""
+    """Flight with changed payloads: {(topic, number): payload}."""
 
     def __init__(self, flown, changes):
         self.setup, self.topics, self._flown, self._changes = flown.setup, flown.topics, flown, changes
@@ -45,12 +45,12 @@ class Changed:
         return [(t, self._changes.get((name, i), p)) for i, (t, p) in enumerate(self._flown.payloads(name))]
 
 
-def test_first_difference_is_named_with_its_field_and_size(flown, tmp_path):
+def test_first_difference_has_field_and_size(flown, tmp_path):
     thinned_log.write(tmp_path / "sample.mcap", thinned_log.take(flown))
     kept = thinned_log.read(tmp_path / "sample.mcap")
     assert thinned_log.first_difference(kept, flown) == []
     truth = flown.messages("ground_truth")
-    number = 8 * math.ceil(len(truth) / thinned_log.KEPT)  # one of those that are kept
+    number = 8 * math.ceil(len(truth) / thinned_log.KEPT)  # a sampled message
     speed = tuple(w + 0.25 for w in truth[number].rotor_speed)
     later = {("ground_truth", i): m._replace(rotor_speed=speed).encode() for i, m in enumerate(truth) if i >= number}
     began, field = thinned_log.first_difference(kept, Changed(flown, later))
@@ -62,20 +62,20 @@ def test_first_difference_is_named_with_its_field_and_size(flown, tmp_path):
     assert f"rotor_speed.0 was {old!r}, is {old + 0.25!r}, by 0.25" in field
 
 
-def test_flight_cut_short_differs_nowhere(flown):
+def test_beginning_of_flight_equals_sample(flown):
     kept = thinned_log.take(flown)
     short = fly(flown.setup, last=217)
     assert thinned_log.first_difference(kept, short, whole=False) == []
     assert any("differs first" in line for line in thinned_log.first_difference(kept, short))
 
 
-def test_single_message_between_those_kept_is_found_too(flown):
+def test_change_between_sampled_messages_is_detected(flown):
     message = flown.messages("ground_truth")[151]._replace(air_density=7.0).encode()
     (began,) = thinned_log.first_difference(thinned_log.take(flown), Changed(flown, {("ground_truth", 151): message}))
     assert "ground_truth: differs first" in began
 
 
-def test_topics_that_come_and_go_are_named(flown):
+def test_added_and_removed_topics_are_named(flown):
     kept = thinned_log.take(flown)
     gone = {f"/{flown.setup.vehicle}/more": kept[f"/{flown.setup.vehicle}/ground_truth"], **kept}
     assert thinned_log.first_difference(gone, flown) == [f"/{flown.setup.vehicle}/more: this topic is gone"]

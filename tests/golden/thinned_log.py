@@ -1,4 +1,4 @@
-"""A flight thinned out: enough of it to say when another flight began to differ, in which field, and by how much."""
+"""Sample of a flight that shows when another flight first differs, in which field, and by how much."""
 
 import hashlib
 import json
@@ -14,8 +14,8 @@ from lapwing.messages import message_class
 from lapwing.messages.message_diff import first_difference as first_field
 from tests.cosim.memory_log import MemoryLog
 
-FINGERPRINTS, KEPT = 200, 10  # of a topic, about
-LARGE = 2000  # [bytes] of a message; of larger ones the first alone is kept
+FINGERPRINTS, KEPT = 200, 10  # approximate numbers per topic
+LARGE = 2000  # [bytes] of a message; a topic of larger messages keeps only the first
 HASHES_FILE = "fingerprints.json.zlib"
 
 
@@ -32,7 +32,7 @@ Sample = dict[str, TopicSample]  # by name in the log
 
 
 def take(log: MemoryLog) -> Sample:
-    """The sample of a flight."""
+    """Return the sample of a flight."""
     result = {}
     for name, topic in log.topics.items():
         messages = [(tick * log.setup.interval_ns, payload) for tick, payload in log.payloads(name)]
@@ -60,12 +60,12 @@ def _fingerprints(messages: list[tuple[int, bytes]], every: int) -> tuple[list[s
 
 
 def _steps(instants: list[int]) -> list[int]:
-    """Return the differences of instants, which compress better; the first is itself."""
+    """Return the first instant and the differences between instants, which compress better."""
     return [b - a for a, b in pairwise([0, *instants])]
 
 
 def write(path: Path, sample: Sample) -> None:
-    """Keep a sample as a log of the messages kept; the fingerprints go along as an attachment."""
+    """Write a sample as a log of its messages, with the fingerprints as an attachment."""
     table = {name: [topic.every, topic.fingerprints, _steps(topic.instants)] for name, topic in sample.items()}
     with LogWriter(path, {}, {HASHES_FILE: zlib.compress(json.dumps(table).encode(), 9)}) as log:
         messages = [(time_ns, name, kind, payload) for name, t in sample.items() for time_ns, kind, payload in t.kept]
@@ -74,7 +74,7 @@ def write(path: Path, sample: Sample) -> None:
 
 
 def read(path: Path) -> Sample:
-    """A sample that `write` has kept."""
+    """Return a sample written by `write`."""
     with LogReader(path) as log:
         table = json.loads(zlib.decompress(log.attachments[HASHES_FILE]))
         current = {recorded: name for name, recorded in log.recorded_names.items()}
@@ -116,7 +116,7 @@ def first_difference(old: Sample, new: MemoryLog, whole: bool = True) -> list[st
 def _began(
     name: str, old: TopicSample, messages: list[tuple[int, bytes]], end_ns: float
 ) -> Iterator[tuple[int, int, str]]:
-    """(last instant at which all was alike, one at which it is not, topic), up to `end_ns`."""
+    """Yield (last equal instant, first instant known to differ, topic) of the first difference up to `end_ns`."""
     fingerprints, _ = _fingerprints(messages, old.every)
     alike = -1
     for i, (was, instant) in enumerate(zip(old.fingerprints, old.instants, strict=True)):
@@ -131,7 +131,7 @@ def _began(
 
 
 def _fields(name: str, old: TopicSample, new: dict[int, bytes], end_ns: float) -> Iterator[tuple[int, str]]:
-    """(instant, line) of the first message kept that differs, up to `end_ns`."""
+    """Yield (instant, line) of the first sampled message that differs, up to `end_ns`."""
     for time_ns, kind, was in old.kept:
         now = new.get(time_ns)
         if now == was or time_ns > end_ns:

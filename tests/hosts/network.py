@@ -1,7 +1,7 @@
-"""Hosts of a network of our own: namespaces, joined by a switch that delays frames, loses them, and cuts hosts off.
+"""Simulated network of hosts: namespaces, joined by a switch that delays and drops frames and disconnects hosts.
 
-The switch is a thread that hands Ethernet frames from one TAP device to another, so that the hosts' own TCP meets what
-is done to them; nothing of the kernel is needed but namespaces and TAP devices.
+The switch is a thread that passes Ethernet frames between TAP devices, so that the TCP of the hosts experiences every
+delay and loss. The kernel only needs namespaces and TAP devices.
 """
 
 import fcntl
@@ -23,11 +23,11 @@ from types import TracebackType
 _TUN = Path("/dev/net/tun")
 _TUNSETIFF, _TAP, _NO_HEADER = 0x400454CA, 0x0002, 0x1000
 _LARGEST = 65535  # [bytes] of a frame
-_networks = itertools.count()  # of this process, several of which may be there at once
+_networks = itertools.count()  # networks of this process, of which several may exist at once
 
 
 def why_not() -> str:
-    """Return the reason why this machine has no such network; "" if it has."""
+    """Return the reason why this machine cannot create such a network; "" if it can."""
     if os.geteuid() != 0:
         return "network namespaces need root"
     if not shutil.which("ip") or not os.access(_TUN, os.W_OK):
@@ -40,26 +40,26 @@ def why_not() -> str:
 
 
 class Network:
-    """Hosts by name, each with an address; `with` makes them, and removes them with all that still runs there.
+    """Hosts by name, each with an address; the context creates them, and removes them with their processes.
 
     Attributes:
         addresses: of the hosts.
         delay: (shortest, longest) time [s] that a frame takes.
-        loss: the part of the frames that are lost.
-        cut_off: hosts that nothing reaches, and from which nothing comes.
+        loss: fraction of the frames that are lost.
+        cut_off: hosts that neither send nor receive.
     """
 
     def __init__(self, hosts: Iterable[str], delay: tuple[float, float] = (0.0, 0.0), loss: float = 0.0, seed: int = 1):
         self.addresses = {name: f"10.211.0.{k}" for k, name in enumerate(hosts, 1)}
         self.delay, self.loss, self.cut_off = delay, loss, set[str]()
         self._chance = random.Random(seed)
-        self._devices: dict[int, str] = {}  # the host of a device, by its descriptor
+        self._devices: dict[int, str] = {}  # host of each device, by descriptor
         self._stack = ExitStack()
         self._mark = f"{os.getpid()}-{next(_networks)}"
         self._wake, self._stop = os.pipe()
 
     def command(self, host: str, *words: str) -> list[str]:
-        """A command line, to be carried out on a host."""
+        """Return the command line that runs `words` on a host."""
         return ["ip", "netns", "exec", self._namespace(host), *words]
 
     def _namespace(self, host: str) -> str:
@@ -95,9 +95,9 @@ class Network:
         self._devices[descriptor] = host
 
     def _run(self) -> None:
-        """Hand frames on: each waits in a heap until its time has come."""
-        waiting: list[tuple[float, int, int, bytes]] = []  # (due, number, descriptor it came from, frame)
-        latest: dict[int, float] = {}  # frames of one host keep their order
+        """Forward frames; each waits in a heap until it is due."""
+        waiting: list[tuple[float, int, int, bytes]] = []  # (due, number, source descriptor, frame)
+        latest: dict[int, float] = {}  # due time of the last frame of a host, to keep the order
         number = 0
         while True:
             left = max(0.0, waiting[0][0] - time.monotonic()) if waiting else None
@@ -116,7 +116,7 @@ class Network:
                 _, _, source, frame = heapq.heappop(waiting)
                 for device, host in self._devices.items():
                     if device != source and host not in self.cut_off:
-                        os.write(device, frame)  # a host leaves alone what is for another
+                        os.write(device, frame)  # hosts ignore frames for others
 
 
 def _ip(*words: str) -> None:

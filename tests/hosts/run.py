@@ -1,4 +1,4 @@
-"""A flight whose participants are spread over the hosts of a network."""
+"""A flight whose participants run on several hosts of a network."""
 
 import subprocess
 import sys
@@ -6,20 +6,20 @@ import time
 
 from lapwing.cosim.processes.run_monitor import MONITOR
 
-SLOWEST = 120.0  # [s] for a run to begin, and to end
-_GROWN = 8  # sizes of a log that is being written, some of which are of its head
+SLOWEST = 120.0  # [s] for a run to begin, and for it to end
+_GROWN = 8  # different sizes of a growing log, the first of which are of its head
 
 
 class Run:
-    """Every participant as a process of its own; `with` ends them all.
+    """One process for each participant; the context ends all of them.
 
     Attributes:
-        log: its log.
-        participants: the processes, by name.
+        log: path of the log.
+        participants: processes by name.
     """
 
     def __init__(self, network, places, overrides, keys, folder):
-        """Create a run of `delivery_mission`; `places` has the host of each participant, `keys` their certificates."""
+        """Start `delivery_mission`; `places` maps participants to hosts, `keys` is the folder of certificates."""
         peers = {name: f"tls/{network.addresses[host]}:{7447 + k}" for k, (name, host) in enumerate(places.items())}
         table = ",".join(f"{name}={endpoint}" for name, endpoint in peers.items())
         sets = [word for override in overrides for word in ("--set", override)]
@@ -47,7 +47,7 @@ class Run:
             process.communicate()
 
     def flies(self):
-        """Wait until the log has grown again and again; says whether it has."""
+        """Wait until the log has grown several times. Return False if it has not."""
         sizes, deadline = set(), time.monotonic() + SLOWEST
         while len(sizes) < _GROWN and time.monotonic() < deadline:
             sizes.add(self.size())
@@ -55,11 +55,11 @@ class Run:
         return len(sizes) == _GROWN
 
     def size(self):
-        """Bytes of the log."""
+        """Return the size of the log [bytes]."""
         return self.log.stat().st_size if self.log.exists() else 0
 
     def ends(self):
-        """Exit code and last words of everybody; who does not end is killed."""
+        """Return the exit code and standard error of each participant; kill those that do not end in time."""
         result = {}
         for name, process in self.participants.items():
             try:

@@ -1,4 +1,4 @@
-"""Services on hosts of their own: the same bits over a bad network, and a name where a host is lost."""
+"""Services on several hosts: equal digests over a bad network, and an error that names a lost host."""
 
 import time
 
@@ -45,7 +45,7 @@ def test_digest_is_equal_over_slow_lossy_network(keys, tmp_path):
         time.sleep(2.0)
         at = run.size()
         time.sleep(0.1)
-        assert run.size() == at  # it waits
+        assert run.size() == at  # the run waits
         network.cut_off = set()
         ends = run.ends()
     assert ends == dict.fromkeys(HOSTS, (0, ""))

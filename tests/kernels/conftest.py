@@ -1,4 +1,4 @@
-"""A small package of kernels on disk, run in processes of its own."""
+"""Small package of kernels on disk, run in separate processes."""
 
 import json
 import os
@@ -135,7 +135,7 @@ print(json.dumps({"values": values, "compiling": compiling, **statistics()._asdi
 
 
 class Package:
-    """The package, and the cache folder of what runs it."""
+    """The package and the kernel cache of its processes."""
 
     def __init__(self, folder: Path):
         self.folder, self.cache = folder, folder / "cache"
@@ -150,12 +150,12 @@ class Package:
         (self.folder / name).write_text(text.replace(old, new))
 
     def start(self, statements: str, **environment: str) -> subprocess.Popen:
-        """A process that runs statements, which put results into `values`."""
+        """Start a process that runs statements, which put results into `values`."""
         settings = {
             **{key: value for key, value in os.environ.items() if not key.startswith("NUMBA")},
             "LAPWING_CACHE": str(self.cache),
             "PYTHONPATH": f"{self.folder}{os.pathsep}{ROOT}",
-            "PYTHONDONTWRITEBYTECODE": "1",  # its own staleness is to the second
+            "PYTHONDONTWRITEBYTECODE": "1",  # byte code detects changes only by the second
             **environment,
         }
         command = [sys.executable, str(self.folder / "run.py"), statements]
@@ -175,5 +175,5 @@ class Package:
 
 @pytest.fixture
 def package(tmp_path) -> Package:
-    """Fresh, with nothing kept."""
+    """Return a new package with an empty cache."""
     return Package(tmp_path)

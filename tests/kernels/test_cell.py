@@ -1,4 +1,4 @@
-"""Cells hold a value, give it back and take another of its type; what they hold is known by its class."""
+"""Cells store a value, return it, and accept another of the same type and class."""
 
 import struct
 import weakref
@@ -17,7 +17,7 @@ from lapwing.kernels.native_memory import layout
 
 
 class Left:
-    """A namespace."""
+    """Namespace."""
 
     class Pair(NamedTuple):
         """One of two classes with the same name and fields."""
@@ -27,10 +27,10 @@ class Left:
 
 
 class Right:
-    """A namespace."""
+    """Another namespace."""
 
     class Pair(NamedTuple):
-        """The other."""
+        """The other class."""
 
         x: float
         inside: tuple[int, float]
@@ -41,7 +41,7 @@ def test_cell_returns_stored_value(value):
     assert read(Cell(value)) == value
 
 
-def test_takes_another_value():
+def test_cell_accepts_another_value():
     cell = Cell(Left.Pair(1.0, (2, 3.0)))
     write(cell, Left.Pair(4.0, (5, 6.0)))
     assert read(cell) == Left.Pair(4.0, (5, 6.0))
@@ -57,14 +57,14 @@ def test_cell_types_differ_for_classes_of_equal_name():
     assert CellType([("value", left)]) == CellType([("value", left)]) != CellType([("value", right)])
 
 
-def test_type_takes_no_hash_of_this_process_to_another():
+def test_pickled_type_has_no_hash_of_this_process():
     kind = CellType([("value", types.float64)])
     assert hash(kind) == hash(kind)
     assert hash(kind) not in kind.__getstate__().values()
 
 
 class Mixed(NamedTuple):
-    """All that a cell may hold, with gaps where memory is aligned."""
+    """All kinds of values in a cell, with gaps for alignment."""
 
     flag: bool
     inside: tuple[float, bool]
@@ -81,7 +81,7 @@ def mixed(rows):
     return Mixed(True, (2.5, False), True, -7, rows, None, (), Left.Pair(1.0, (2, 3.0)), True)
 
 
-def test_memory_is_laid_out_as_compiler_does():
+def test_memory_layout_equals_layout_of_compiler():
     kind = typeof(mixed(np.zeros((2, 3))))
     context = cpu_target.target_context
     assert struct.calcsize(layout(kind).format) == context.get_abi_sizeof(context.get_value_type(kind))
@@ -108,7 +108,7 @@ def test_compiled_code_reads_and_writes_cell():
 
 
 class Holder(NamedTuple):
-    """A cell in a cell."""
+    """Cell in a cell."""
 
     inside: Cell
 
@@ -145,7 +145,7 @@ def test_arrays_and_cells_live_while_referenced():
     assert after.mi_alloc - after.mi_free == before.mi_alloc - before.mi_free
 
 
-def test_takes_no_value_of_another_type():
+def test_cell_rejects_value_of_another_type():
     cell = Cell((1.0, 2.0))
     with pytest.raises(TypeError, match="expected a value of type"):
         write(cell, (1.0, 2))

@@ -1,4 +1,4 @@
-"""Functions made from text: the same in Python as compiled, one for each combination of argument types."""
+"""Functions compiled from text: equal in Python and compiled code, one for each combination of argument types."""
 
 from numba.core import types
 
@@ -12,7 +12,7 @@ def weighted(k, x, y):
 
 
 @always_inline
-def taken(x, y, i):
+def item_difference(x, y, i):
     return x[i] - y[i]
 
 
@@ -24,14 +24,14 @@ def first(x):
 
 @kernel
 def all_of(x, y):
-    return map_tuple(weighted, 2.0, x, y), map_index(taken, x, x, y), first(x), first(x[1])
+    return map_tuple(weighted, 2.0, x, y), map_index(item_difference, x, x, y), first(x), first(x[1])
 
 
-def test_defines_function_of_several_lines():
+def test_source_may_have_several_lines():
     assert compile_source("f(a, b)", {"one": 1}, "c = a + one", "return c * b")(2, 3) == 9
 
 
-def test_compiled_and_uncompiled_are_same():
+def test_compiled_code_equals_plain_python():
     x, y = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)
     assert all_of(x, y) == all_of.py_func(x, y) == ((6.0, 9.0, 12.0), (-3.0, -3.0, -3.0), 1.0, 2.0)
     assert (first.__name__, first.__doc__) == ("first", "Return the first number.")
@@ -47,7 +47,7 @@ def above(_, x, y):
     return x > y
 
 
-def test_any_of_tuple():
+def test_any_in_tuple_is_true_for_any_true_item():
     for y, result in (((0.0, 5.0, 4.0), True), ((3.0, 5.0, 4.0), False)):
         assert any_above((1.0, 2.0, 3.0), y) == any_above.py_func((1.0, 2.0, 3.0), y) == result
     assert not any_in_tuple(())
@@ -63,6 +63,6 @@ def folded(x, y):
     return reduce_tuple(appended, 10.0, 1.0, x, y)
 
 
-def test_folds_in_order():
+def test_reduce_tuple_keeps_order():
     x, y = (1.0, 2.0, 3.0), (1.0, 1.0, 2.0)
     assert folded(x, y) == folded.py_func(x, y) == 1126.0

@@ -1,4 +1,4 @@
-"""Locks of kernels: how long a process waits for another one that compiles the same kernel."""
+"""Locks of kernels: waiting time of a process while another process compiles the same kernel."""
 
 import os
 from types import SimpleNamespace
@@ -12,7 +12,7 @@ HELD = 300  # [s] until the holder releases the lock, more than `PATIENCE`
 
 @pytest.fixture
 def seconds_waited(tmp_path, monkeypatch):
-    """Return a function that waits for a held lock on a clock of its own; `work` gives the holder's work at a time."""
+    """Return a function that waits for a held lock in simulated time; `work` returns the holder's work at a time."""
     monkeypatch.setattr(cache_files, "root", lambda: tmp_path)
 
     def wait(work):
@@ -36,20 +36,20 @@ def seconds_waited(tmp_path, monkeypatch):
     return wait
 
 
-def test_process_that_works_is_waited_for_to_its_end(seconds_waited):
+def test_lock_waits_for_working_process(seconds_waited):
     assert seconds_waited(lambda now: str(now // 100.0)) == HELD
 
 
-def test_process_that_does_no_work_is_not_waited_for(seconds_waited):
+def test_lock_does_not_wait_for_idle_process(seconds_waited):
     assert seconds_waited(lambda now: "7 3") == pytest.approx(file_locks.PATIENCE, abs=1.0)
 
 
-def test_wait_for_other_container_ends(seconds_waited, monkeypatch):
+def test_wait_for_process_of_other_container_ends(seconds_waited, monkeypatch):
     monkeypatch.setattr(file_locks, "LONGEST", 200.0)
     assert seconds_waited(str) == pytest.approx(200.0, abs=1.0)
 
 
-def test_work_of_holder_is_its_processor_time(tmp_path, monkeypatch):
+def test_work_of_holder_is_processor_time(tmp_path, monkeypatch):
     monkeypatch.setattr(cache_files, "root", lambda: tmp_path)
     with file_locks.release_at_end():
         file_locks.acquire("kernel")
@@ -62,7 +62,7 @@ def test_work_of_holder_is_its_processor_time(tmp_path, monkeypatch):
     assert file_locks._work_of_holder(path) == ""
 
 
-def test_number_of_killed_holder_is_replaced(tmp_path, monkeypatch):
+def test_process_id_of_killed_holder_is_replaced(tmp_path, monkeypatch):
     monkeypatch.setattr(cache_files, "root", lambda: tmp_path)
     with file_locks.release_at_end():
         file_locks.acquire("kernel")

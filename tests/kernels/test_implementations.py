@@ -1,4 +1,4 @@
-"""Assumption of the kernel cache: implementations are in the module of their function, which users import."""
+"""Assumption of the kernel cache: implementations are in the module of their function, which callers import."""
 
 import ast
 from pathlib import Path

@@ -19,7 +19,7 @@ VALUES = {"outer": 7.0, "total": 30.0, "product": [4.0, 10.0]}
 
 
 def files(package):
-    """All that is kept."""
+    """Return all files of the cache."""
     return sorted(path for path in package.cache.rglob("*") if path.is_file())
 
 
@@ -32,14 +32,14 @@ def test_second_process_compiles_no_kernel(package):
     assert second["loaded"] > 0
 
 
-def test_loading_kernels_does_not_set_up_numba_for_compilation(package):
+def test_loading_kernels_does_not_import_numba_compiler_modules(package):
     names = "('numba.np.arraymath', 'scipy.linalg')"
     run = f"{OUTER}; import sys; values['imported'] = [name for name in {names} if name in sys.modules]"
-    assert "numba.np.arraymath" in package.run(run)["values"]["imported"]  # it compiles
+    assert "numba.np.arraymath" in package.run(run)["values"]["imported"]  # with compilation
     assert package.run(run)["values"] == {"outer": 7.0, "imported": []}
 
 
-def test_loaded_kernel_hashes_texts_as_python_does(package):
+def test_loaded_kernel_hashes_texts_like_python(package):
     run = "from plant.texts import text_hash; values['equal'] = text_hash(5) == hash('abcde')"
     for compiled in (True, False):
         result = package.run(run)
@@ -66,7 +66,7 @@ def test_edit_of_reachable_source_recompiles(package, statements, file, old, new
     assert edited["values"] == after
     assert edited["compiled"] > 0
     package.edit(file, new, old)
-    assert package.run(statements)["compiled"] == 0  # both versions are kept
+    assert package.run(statements)["compiled"] == 0  # the cache has both versions
 
 
 def test_edit_of_unreachable_source_compiles_no_kernel(package):
@@ -92,14 +92,14 @@ values["outermost"] = outermost(3.0)
     assert edited["compiling"] == ["plant.outermost.outermost"]
 
 
-def test_constant_set_from_outside_counts_as_edit(package):
+def test_constant_set_by_another_module_recompiles(package):
     package.run(OUTER)
     other = package.run(f"import plant.inner; plant.inner.GAIN = 100.0\n{OUTER}")
     assert other["values"] == {"outer": 301.0}
     assert package.run(OUTER)["values"] == {"outer": 7.0}
 
 
-def test_implementation_registered_elsewhere_counts_as_edit(package):
+def test_implementation_of_another_module_recompiles(package):
     package.run(TOTAL)
     (package.folder / "other.py").write_text(
         "import plant.law\nfrom lapwing.kernels import always_inline\n\n"
@@ -113,11 +113,11 @@ def test_implementation_registered_elsewhere_counts_as_edit(package):
 def test_source_changed_during_run_is_not_stored(package):
     edit = "import plant.outer; open('plant/constants.py', 'w').write('GAIN = 5.0')"
     running = package.run(f"{edit}\n{OUTER}")
-    assert running["values"] == {"outer": 7.0}  # it had read the old one
+    assert running["values"] == {"outer": 7.0}  # read before the edit
     assert package.run(OUTER)["values"] == {"outer": 16.0}
 
 
-def test_damage_in_any_file_costs_compilation(package):
+def test_damaged_file_is_recompiled_and_replaced(package):
     package.run(ALL)
     whole = {path: path.read_bytes() for path in files(package)}
     assert len(whole) > 8
@@ -135,7 +135,7 @@ def test_damage_in_any_file_costs_compilation(package):
         run = package.run(ALL)
         assert run["values"] == VALUES
         assert run["loaded"] == 0
-        assert package.run(ALL)["compiled"] == 0  # it has been mended
+        assert package.run(ALL)["compiled"] == 0  # the entries were replaced
 
 
 def test_version_with_missing_name_does_not_affect_others(package):
@@ -147,18 +147,18 @@ def test_version_with_missing_name_does_not_affect_others(package):
     assert (run["values"], run["compiled"]) == ({"read": 2.0}, 0)
 
 
-def test_several_processes_that_warm_at_once(package):
+def test_simultaneous_processes_compile_each_kernel_once(package):
     alone = package.run(ALL)
     shutil.rmtree(package.cache)
     ended = [package.end(process) for process in [package.start(ALL) for _ in range(4)]]
     assert [run["values"] for run in ended] == [VALUES] * 4
-    assert sum(run["compiled"] for run in ended) == alone["compiled"]  # each kernel by one of them
+    assert sum(run["compiled"] for run in ended) == alone["compiled"]  # each kernel once
     assert not list((package.cache / "compiling").iterdir())
     last = package.run(ALL)
     assert (last["values"], last["compiled"]) == (VALUES, 0)
     assert all(
         path.name.count(".") == path.name.rpartition("-")[0].count(".") for path in files(package)
-    )  # all renamed
+    )  # no temporary files
 
 
 SLOW = "from plant.slow import slow; values['slow'] = slow(2.0)"
@@ -166,7 +166,7 @@ SLOW = "from plant.slow import slow; values['slow'] = slow(2.0)"
 
 @pytest.fixture
 def compiling(package):
-    """A process in the midst of compiling `slow`."""
+    """Yield a process that is compiling `slow`."""
     started = package.folder / "begun"
     process = package.start(SLOW, BEGUN=str(started))
     while not started.exists():
@@ -177,7 +177,7 @@ def compiling(package):
     process.communicate()
 
 
-def test_compiling_process_is_waited_for(package, compiling):
+def test_process_waits_for_compiling_process(package, compiling):
     other = package.start(SLOW)
     with pytest.raises(subprocess.TimeoutExpired):
         other.wait(5.0)
@@ -186,7 +186,7 @@ def test_compiling_process_is_waited_for(package, compiling):
     assert (ended["values"], ended["compiled"]) == ({"slow": 3.0}, 1)
 
 
-def test_suspended_compiling_process_is_not_waited_for(package, compiling):
+def test_process_does_not_wait_for_suspended_compiling_process(package, compiling):
     compiling.send_signal(signal.SIGSTOP)
     ended = package.run(f"from lapwing.kernels.compiler import file_locks; file_locks.PATIENCE = 0.1; {SLOW}")
     assert (ended["values"], ended["compiled"]) == ({"slow": 3.0}, 1)
@@ -213,7 +213,7 @@ def test_entry_writable_for_others_is_not_executed(package):
         assert stat.S_IMODE(path.stat().st_mode) == 0o600
         path.chmod(0o666)
     assert package.run(ALL)["loaded"] == 0
-    assert package.run(ALL)["compiled"] == 0  # by files of its own
+    assert package.run(ALL)["compiled"] == 0  # from new private files
     if os.geteuid() == 0:
         for path in files(package):
             os.chown(path, 1, 1)
@@ -227,7 +227,7 @@ def test_only_last_versions_are_kept(package):
     assert len(list((package.cache / "imports").glob("plant.constants-*"))) == 4
 
 
-def test_numbas_own_cache_is_left_alone(package):
+def test_cache_of_numba_is_unchanged(package):
     (package.folder / "own.py").write_text(
         "from numba import njit\n\n@njit(cache=True)\ndef own(x):\n    return x + 1.0\n"
     )

@@ -1,4 +1,4 @@
-"""Memory that compilation leaves behind."""
+"""Memory that remains after compilation."""
 
 from collections import Counter
 
@@ -9,7 +9,7 @@ from lapwing.kernels import kernel
 
 
 def _compile_first_kernel():
-    """Compile what numba itself compiles before the first kernel of a process."""
+    """Compile the functions that numba compiles before the first kernel of a process."""
 
     @kernel
     def same(x):

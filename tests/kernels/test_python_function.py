@@ -1,4 +1,4 @@
-"""A kernel as a Python function: on numpy arrays too, and nothing is compiled, not even what it calls."""
+"""Kernels as Python functions: they accept numpy arrays and compile neither themselves nor called kernels."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Trees as rows, and the columns of many rows."""
+"""Trees as rows, and columns of many rows."""
 
 import gc
 import math
@@ -77,8 +77,8 @@ def test_rows_accept_numbers_only():
         _copied((1.0, "text"), np.zeros((2, 2)), 0, 1)
 
 
-def test_rows_are_let_go_with_their_columns():
-    """Without the garbage collector, which commands run seldom: a page of rows is there no longer than it is used."""
+def test_rows_are_released_with_their_columns():
+    """Release the rows without the garbage collector, which commands rarely run."""
     rows = np.stack([pack_row(LIKE)] * 3)
     gone = weakref.ref(rows)
     gc.disable()

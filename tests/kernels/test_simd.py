@@ -1,4 +1,4 @@
-"""Lanes compute what floats compute, lane by lane and to the same bits."""
+"""Lanes equal scalar floats bit for bit."""
 
 import math
 
@@ -34,7 +34,7 @@ def on_lanes(a, b, s):
     return unpack4(formula(pack4(a[0], a[1], a[2], a[3]), pack4(b[0], b[1], b[2], b[3]), s))
 
 
-def test_arithmetic_is_that_of_floats():
+def test_lane_arithmetic_equals_float_arithmetic():
     rng = np.random.default_rng(1)
     for _ in range(50):
         a, b = (tuple(row) for row in rng.normal(size=(2, 4)).tolist())
@@ -48,7 +48,7 @@ def turned(four, v):
     return deinterleave((q, vector.apply(R, v), vector.cross(v, quaternion.rotate(q, v))))
 
 
-def test_trees_go_in_and_out_in_their_order():
+def test_interleaved_trees_keep_order():
     rng = np.random.default_rng(2)
     four = tuple(Quaternion(*row) for row in rng.normal(size=(4, 4)).tolist())
     v = (0.1, -0.4, 0.8)
@@ -63,7 +63,7 @@ def chosen(flag, x):
     return unpack4(select(f, sqrt(interleave(x)), -1.0)), horizontal_sum(interleave(x))
 
 
-def test_choice_root_and_sum():
+def test_select_sqrt_and_horizontal_sum():
     x = (4.0, 9.0, 2.0, -1.0)
     picked, whole = chosen((1.0, 0.0, 0.5, -1.0), x)
     assert picked == (2.0, -1.0, math.sqrt(2.0), -1.0)
@@ -88,6 +88,6 @@ def moved(a):
     return a
 
 
-def test_in_and_out_of_memory():
+def test_load_and_store_access_array():
     a = np.arange(12.0).reshape(3, 4)
     np.testing.assert_array_equal(moved(a).ravel(), [0, 1, 2, 3, 4, 11, 12, 13, 14, 9, 10, 11])

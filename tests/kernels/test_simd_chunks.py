@@ -1,4 +1,4 @@
-"""Groups of four hold all members in their order, and give them back without the filling."""
+"""Chunks of four keep the members in order, and restore them without padding."""
 
 import pytest
 
@@ -7,15 +7,15 @@ from lapwing.kernels.simd_chunks import chunk4, unchunk4
 
 
 @kernel
-def there_and_back(values):
+def round_trip(values):
     groups = chunk4(values, -1.0)
     return groups, unchunk4(groups, values)
 
 
 @pytest.mark.parametrize("n", [1, 4, 6])
-def test_there_and_back(n):
+def test_chunks_round_trip(n):
     values = tuple(float(i) for i in range(n))
-    groups, back = there_and_back(values)
+    groups, back = round_trip(values)
     assert back == values
     assert [member for group in groups for member in group] == [*values, *[-1.0] * (-n % 4)]
-    assert (groups, back) == there_and_back.py_func(values)
+    assert (groups, back) == round_trip.py_func(values)

@@ -1,4 +1,4 @@
-"""Tree operations: shapes, values against hand-written ones, compiled against uncompiled."""
+"""Tree operations: shapes, hand-written values, compiled and uncompiled code."""
 
 import math
 import random
@@ -97,16 +97,16 @@ def test_relative_difference_is_relative_to_size():
 
 
 @kernel
-def compiled_apart(x, y):
+def compiled_difference(x, y):
     return state_tree.relative_difference(x, y)
 
 
-def test_apart_of_nested_tuples_is_that_of_their_numbers():
-    """Bit by bit, whatever tuples hold them; what is NaN does not count."""
+def test_relative_difference_is_independent_of_nesting():
+    """Compare nested with flat numbers bit for bit; NaN is ignored."""
     numbers = random.Random(1)
     for nan in (False, True):
         x, y = ([numbers.uniform(-9.0, 9.0) for _ in range(9)] for _ in range(2))
         y[4] = math.nan if nan else y[4]
         flat = max(abs(a - b) / (1.0 + abs(a)) for a, b in zip(x, y, strict=True) if not math.isnan(b))
         nested_x, nested_y = (((), (n[:3], n[3:6]), (n[6], (n[7],)), n[8]) for n in (tuple(x), tuple(y)))
-        assert state_tree.relative_difference(nested_x, nested_y) == compiled_apart(nested_x, nested_y) == flat
+        assert state_tree.relative_difference(nested_x, nested_y) == compiled_difference(nested_x, nested_y) == flat

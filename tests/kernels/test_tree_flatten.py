@@ -1,4 +1,4 @@
-"""A function written for one structure flattens its values, and no others."""
+"""Flatteners for one structure: they flatten its values and reject others."""
 
 import itertools
 
@@ -19,22 +19,22 @@ def test_flatten_accepts_its_structure_only():
         assert result is None or all(map(same, result, leaves(b)))
 
 
-def test_flattens_trees():
+def test_flattener_equals_recursive_flattening():
     for value in NESTED:
         result, expected = Flattener(value).leaves(value), leaves(value)
         assert len(result) == len(expected)
         assert all(map(same, result, expected))
 
 
-def test_whole_number_of_more_bits_is_another_type():
+def test_integer_beyond_int64_is_another_structure():
     assert Flattener((1, 2.0)).leaves((2**62, 2.0)) == (2**62, 2.0)
     assert Flattener((1, 2.0)).leaves((2**63, 2.0)) is None
     assert Flattener((1, 2.0)).leaves(("text", 2.0)) is None
 
 
-def test_cells_of_one_structure_hold_their_own_values():
+def test_cells_of_equal_structure_hold_separate_values():
     grid = np.arange(6.0).reshape(2, 3)
-    for k in range(4):  # the first is walked through, the others by a function
+    for k in range(4):  # the first recursively, the others by a generated function
         kept = Cell(0.5 * k)
         held = Cell((k, (0.5 * k, k > 1), grid + k, kept, None)).memory
         numbers = held._block.numbers()

@@ -1,4 +1,4 @@
-"""Values of one structure are of one type of numba, and the other way round."""
+"""Values have equal structures exactly if they have equal numba types."""
 
 import itertools
 from typing import NamedTuple
@@ -32,7 +32,7 @@ VALUES = [
 ]  # fmt: skip
 
 
-def test_one_structure_one_type():
+def test_equal_structures_have_equal_types():
     for a, b in itertools.product(VALUES, VALUES):
         if structure(a) == structure(b):
             assert numba.typeof(a) == numba.typeof(b)
@@ -40,19 +40,19 @@ def test_one_structure_one_type():
     assert structure(GRID) == structure(np.ones((7, 2)))
 
 
-def test_another_type_is_another_structure():
+def test_different_types_have_different_structures():
     for a, b in itertools.product(VALUES, VALUES):
         if numba.typeof(a) != numba.typeof(b):
             assert structure(a) != structure(b)
 
 
 @pytest.mark.parametrize("value", ["text", [1.0], 2**63, object(), (1.0, ["list"])])
-def test_leaves_rest_to_numba(value):
+def test_unknown_values_raise_error(value):
     with pytest.raises(UnknownError):
         structure(value)
 
 
-def test_whole_number_beyond_64_bits_signed_is_no_int64():
+def test_integer_beyond_int64_is_uint64():
     assert numba.typeof(2**63) == numba.types.uint64
-    for number in (1, 2, 2**63):  # the second is flattened by a function of its own
+    for number in (1, 2, 2**63):  # a flattening function handles the second
         assert Cell(number).memory.read() == number

@@ -10,7 +10,7 @@ def test_layout_byte_by_byte():
     assert len(pack(-1, 2**62, GID)) == 33
 
 
-def test_round_trip():
+def test_attachment_round_trips():
     assert unpack(pack(7, 123456789012, GID)) == Attachment(7, 123456789012, GID)
     assert time_and_gid(pack(7, -5, GID)) == (-5, GID)
 

@@ -90,7 +90,7 @@ def test_single_value_and_column_of_width_one_are_broadcast():
     assert {message.moment for message in decoded} == {((4.0, 5.0, 7.0),)}
 
 
-def test_stamps():
+def test_stamp_columns_have_given_times():
     times = np.array([0, 999_999_999, 1_000_000_000, 86_400_000_000_004])
     records = Record.of(Imu(header(5, "body"))).encode(4, stamp_columns(times))
     assert [stamp_ns(Imu.decode(payload).header) for payload in payloads(records)] == times.tolist()

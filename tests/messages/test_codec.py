@@ -80,7 +80,7 @@ def test_payload_of_wrong_length_is_rejected(name):
 
 
 @pytest.mark.parametrize("name", TYPES)
-def test_damaged_bytes_give_message_or_value_error(name):
+def test_damaged_bytes_are_decoded_or_raise_value_error(name):
     rng = random.Random(name)
     faults = []
     for message in samples(name)[:10]:

@@ -17,7 +17,7 @@ def digest(entries):
     return result.hexdigest()
 
 
-def test_definition():
+def test_digest_equals_definition():
     parts = hashlib.blake2b(b"".join(struct.pack("<qQ", t, len(p)) + p for _, t, p in A), digest_size=32)
     assert digest(A) == hashlib.blake2b(b"\2\0\0\0/a" + parts.digest(), digest_size=16).hexdigest()
 

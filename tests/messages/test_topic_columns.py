@@ -28,7 +28,7 @@ def test_columns_are_fields_of_decoded_messages(name, seed):
             assert flat(result if isinstance(result, tuple) else (result,)) == flat((value(message, field),)), field
 
 
-def test_topic_of_one_shape_returns_arrays():
+def test_topic_of_constant_shape_returns_arrays():
     times = [k * 4_000_000 for k in range(500)]
     messages = [Imu(header(t, "body"), angular_velocity=Vector3(t, 1.0, -t)) for t in times]
     columns = history(Imu, [message.encode() for message in messages])

@@ -1,4 +1,4 @@
-"""Certificates of participants: what is written, and who may read and write it."""
+"""Certificates of participants: files, their permissions, and invalid certificates."""
 
 import os
 import re
@@ -31,7 +31,7 @@ def test_files_are_private_with_any_umask(tmp_path):
     ("place", "time", "message"),
     [(1, "200101000000Z", "expired on 2020-01-01"), (0, "490101000000Z", "is valid from 2049")],
 )
-def test_run_names_certificate_that_is_not_valid(tmp_path, place, time, message):
+def test_run_names_invalid_certificate(tmp_path, place, time, message):
     make(tmp_path / "keys", ["mission", "router", "plant"], 1)
     path = tmp_path / "keys" / "router" / "certificate.pem"
     der = ssl.PEM_cert_to_DER_cert(path.read_text())

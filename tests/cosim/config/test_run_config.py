@@ -1,4 +1,4 @@
-"""A run resolved once: as text and back it is the same run, to the bit of its flight."""
+"""Run configuration: resolution, ports and order of services, and a round trip through text."""
 
 import pytest
 
@@ -35,12 +35,12 @@ def test_resolution_is_deterministic_and_overrides_change_it():
 
 
 @pytest.mark.long
-def test_set_up_from_its_text_flies_to_same_digest():
+def test_configuration_restored_from_text_flies_to_same_digest():
     setup = resolve(load("hover", ["run.duration=0.4", "effects.random_wind_force.sigma=1.0"]))
     assert fly(from_json(to_json(setup))).digest == fly(setup).digest
 
 
-def test_ports_and_their_producers_are_found_by_name():
+def test_port_and_producer_are_found_by_name():
     port = Port("wind", (0.0, 0.0), 5)
     setup = setup_of((port,))
     assert setup.port("wind") == port
@@ -50,7 +50,7 @@ def test_ports_and_their_producers_are_found_by_name():
         setup.port("rain")
 
 
-def test_order_of_services_follows_their_ports():
+def test_order_of_services_follows_ports():
     services = {
         "controller": ServiceConfig(None, (InputPort("wind"),), ()),
         "weather": ServiceConfig(None, (), (Port("wind", 0.0),)),

@@ -1,4 +1,4 @@
-"""Trees to canonical text and back: the same values, the same types, the same text."""
+"""Round trip of trees through canonical text: equal values, types and text."""
 
 import json
 import math
@@ -83,7 +83,7 @@ def test_trees_differ_where_their_digests_do(a, b):
 
 
 @given(st.dictionaries(st.text(), st.integers(), min_size=2))
-def test_order_of_keys_does_not_matter(table):
+def test_text_is_independent_of_key_order(table):
     assert to_json(dict(reversed(table.items()))) == to_json(table)
 
 
@@ -94,7 +94,7 @@ def test_numbers_are_exact(value):
     json.loads(to_json(value), parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
 
 
-def test_class_is_named_and_found_again():
+def test_class_is_restored_from_its_name():
     text = to_json(Gravity(9.81))
     assert text == '{"$":"lapwing.dynamics.effects.gravity:Gravity","acceleration":9.81}'
     assert from_json(text) == Gravity(9.81)
@@ -133,7 +133,7 @@ def test_unsupported_value_is_rejected_with_path():
             to_json(tree)
 
 
-def test_first_difference_has_its_path():
+def test_first_difference_has_path():
     a = {"vehicle": Pair((1.0, [Gravity(9.81)])), "wind": 1}
     b = {"vehicle": Pair((1.0, [Gravity(9.82)])), "wind": 2}
     assert first_difference(a, b) == ("vehicle.left.1.0.acceleration", 9.81, 9.82)

@@ -1,4 +1,4 @@
-"""Modules of the user's own: found, carried as text, run from it."""
+"""User modules: found in the scene folder or on the path, stored as text, and executed from it."""
 
 import os
 import py_compile
@@ -21,7 +21,7 @@ def test_module_and_its_imports_are_found_in_scene_folder(tmp_path):
     assert result["own_helper"] == tmp_path / "own_helper.py"
 
 
-def test_module_is_found_on_pythons_path(tmp_path, monkeypatch):
+def test_module_is_found_on_python_path(tmp_path, monkeypatch):
     (tmp_path / "own_elsewhere.py").write_text("x = 1")
     monkeypatch.syspath_prepend(tmp_path)
     assert find("key", "own_elsewhere", tmp_path / "scenes") == {"own_elsewhere": tmp_path / "own_elsewhere.py"}
@@ -50,12 +50,12 @@ def test_stored_text_is_executed_with_neighbours():
     assert load("own_first", texts) is sys.modules["own_first"]
 
 
-def test_another_text_under_same_name_is_run_anew():
+def test_changed_text_is_executed_again():
     load("own_first", {"own_first": "from own_second import value\n", "own_second": "value = 3\n"})
     assert load("own_first", {"own_first": "from own_second import value\n", "own_second": "value = 4\n"}).value == 4
 
 
-def test_damaged_file_of_cache_is_mended():
+def test_damaged_cache_file_is_replaced():
     module = load("own_kept", {"own_kept": "value = 5\n"})
     for damage in (b"value = 6\n", b"\xff"):
         Path(module.__file__).write_bytes(damage)
@@ -77,7 +77,7 @@ def test_files_writable_by_others_are_not_executed(monkeypatch, tmp_path):
     file = Path(load("own_planted", {"own_planted": text}).__file__)
     assert file.is_relative_to(tmp_path)
     written = file.stat()
-    file.write_text("value = 9\n")  # machine code of other text, which Python takes for that of this one
+    file.write_text("value = 9\n")  # byte code of another text, which Python would use for this one
     os.utime(file, ns=(written.st_atime_ns, written.st_mtime_ns))
     py_compile.compile(str(file))
     file.write_text(text)

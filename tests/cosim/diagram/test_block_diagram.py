@@ -1,4 +1,4 @@
-"""Graphs: Python parts among compiled ones, parts replaced in flight, pages of messages."""
+"""Block diagrams: Python blocks among compiled blocks, replaced blocks, record batches."""
 
 from dataclasses import replace
 from typing import NamedTuple
@@ -24,7 +24,7 @@ NUMBERS, TOTAL = Port("numbers", Number(0.0), LATCHED), Port("total", Number(0.0
 
 
 class Acting:
-    """A part in Python that writes down when it acts, and names its next tick by a rule."""
+    """Python block that notes its ticks and computes its next tick by a rule."""
 
     def __init__(self, name, following=lambda tick: NEVER, outputs=(), does=lambda graph, tick: None):
         self.name, self.outputs, self.ticks = name, outputs, []
@@ -50,7 +50,7 @@ def test_python_block_runs_at_requested_ticks():
     graph.advance(30)
     assert seldom.ticks == [0, 7, 14, 21, 28]
     assert once.ticks == [0]
-    assert always.ticks == list(range(30))  # a tick that has been is the next one
+    assert always.ticks == list(range(30))  # a past tick means the next one
 
 
 def test_wake_up_reaches_later_python_blocks_at_same_tick():
@@ -103,7 +103,7 @@ def test_port_without_producer_is_named():
 
 
 def wire(topic=SETPOINT, period=1):
-    """The readings' count as a phase that has one of two texts."""
+    """Return an encoder whose phase text depends on `good` of the readings."""
     texts = ("climb", "on the way")
     return TopicEncoder(
         topic, "readings", period,
@@ -114,7 +114,7 @@ def wire(topic=SETPOINT, period=1):
 
 
 def messages(pages):
-    """{topic name: [(tick, payload)]} in order."""
+    """Return {topic name: [(tick, payload)]} in order."""
     result = {}
     for page in pages:
         of_topic = result.setdefault(page.topic.name, [])
@@ -122,7 +122,7 @@ def messages(pages):
     return {name: sorted(of_topic) for name, of_topic in result.items()}
 
 
-def test_pages_are_equal_for_any_length():
+def test_record_batches_are_equal_for_any_length():
     def flown(stops):
         graph = graph_of(readings(end=50), wires=[wire(), wire(COMMAND_ACKS, 4)], page=64)
         pages = []
@@ -163,13 +163,13 @@ def test_python_messages_are_returned_once_within_ticks():
 
 
 class Pair(NamedTuple):
-    """A port of two numbers."""
+    """Port of two numbers."""
 
     left: float
     right: float
 
 
-def test_rows_are_put_and_read_as_numbers_too():
+def test_rows_may_be_put_and_read_as_numbers():
     port = Port("pair", Pair(0.0, 0.0), 2)
     user = Acting("user")
     user.inputs = (InputPort("pair", 6),)

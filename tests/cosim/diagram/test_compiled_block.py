@@ -1,4 +1,4 @@
-"""Compiled parts on rows: trees in and out, signals, states, delays, rings."""
+"""Compiled blocks on rows: inputs, outputs, statuses, states, delays, ring buffers."""
 
 import math
 
@@ -65,7 +65,7 @@ def test_delayed_message_is_due_after_delay_for_any_page(delay):
 
 
 @pytest.mark.parametrize("delay", [0, 1, 7])
-def test_of_slower_port_message_is_due_at_its_ticks_only(delay):
+def test_message_of_slow_port_is_due_at_its_ticks_only(delay):
     slow = Port("readings", LIKE, 5)
     graph = graph_of(readings(5, slow), echo(slow, delay), page=4)
     for tick in range(60):
@@ -114,7 +114,7 @@ def test_no_block_steps_after_last_tick():
     assert graph.tick == 7
 
 
-def test_failure_is_error_of_block_or_names_block():
+def test_failure_raises_error_of_block_or_names_block():
     for error, output in (
         (None, "readings: non-finite or invalid state at tick 4"),
         (lambda tick: ValueError(tick), "4"),
@@ -124,7 +124,7 @@ def test_failure_is_error_of_block_or_names_block():
         graph = graph_of(part, page=16)
         with pytest.raises(LockStepError if error is None else ValueError, match=f"^{output}$"):
             graph.advance(16)
-        assert graph.tick == 4  # the ticks before it can be recorded
+        assert graph.tick == 4  # earlier ticks can be recorded
 
 
 def test_equal_blocks_have_separate_states_and_parameters():
@@ -153,11 +153,11 @@ def test_blocks_with_common_cell_share_state():
     assert [graph.latest(f"sum{i}", 0).value for i in range(2)] == [3.0, 6.0]
 
 
-def test_part_may_be_bound_in_two_graphs():
+def test_block_may_be_bound_in_two_diagrams():
     part = readings()
     first, second = graph_of(part), graph_of(part)
     for tick in range(6):
         first.advance(tick + 1)
         second.advance(tick + 1)
-        assert first.latest("readings", tick) == expected(2.0, tick, 2 * tick + 1)  # the state is the part's
+        assert first.latest("readings", tick) == expected(2.0, tick, 2 * tick + 1)  # both share the state of the block
         assert second.latest("readings", tick) == expected(2.0, tick, 2 * tick + 2)

@@ -1,4 +1,4 @@
-"""Vehicles that nothing couples step one after the other, a page at a time: as if they took turns at every tick."""
+"""Uncoupled vehicles step separately, several ticks at a time, with the results of lock step."""
 
 import pytest
 
@@ -17,7 +17,7 @@ TOGETHER = {"together": True, "apart": False}
 
 
 def counters(together, **parameters):
-    """A part of each vehicle; together: the first takes what the last one gives."""
+    """Return a block for each vehicle; `together`: the first block reads the output of the last."""
     names = list(parameters)
     taken = (InputPort(names[-1], 1),) if together else ()
     return [
@@ -63,8 +63,8 @@ def test_run_ends_with_last_vehicle_at_equal_ticks(last, pages, together):
         (Counter(20, 5), Counter(20), Counter(20)),
         (Counter(20), Counter(20), Counter(20, 5)),
         (Counter(20, 6), Counter(20, 5), Counter(20, 7)),
-        (Counter(2), Counter(3), Counter(20, 5)),  # two are over before
-        (Counter(2, 5), Counter(20), Counter(20)),  # one fails that is over
+        (Counter(2), Counter(3), Counter(20, 5)),  # two have finished before
+        (Counter(2, 5), Counter(20), Counter(20)),  # a finished block fails
         (Counter(2, 5), Counter(20, 7), Counter(20)),
     ],
 )
@@ -78,7 +78,7 @@ def test_first_failure_is_raised_at_equal_ticks(a, b, c, together):
 
 
 class Speaker:
-    """A part in Python that says something at every third tick."""
+    """Python block that publishes a message at every third tick."""
 
     outputs = ()
 
@@ -107,7 +107,7 @@ def test_messages_are_in_order_of_ticks(together):
 
 
 class Clock:
-    """A part in Python that owns time."""
+    """Python block that owns the clock."""
 
     name, outputs = "clock", ()
 

@@ -1,4 +1,4 @@
-"""Several vehicles in one scene: each flies to the bit as it would alone, in one graph and in one for each service."""
+"""Several vehicles in a scene: each flies bit for bit as alone, in one diagram and in one for each service."""
 
 import re
 
@@ -41,7 +41,7 @@ z = { kind = "minimum_jerk", to = 1.0, duration = 1.0 }
 
 
 def fleet_of(n, tmp_path):
-    """n vehicles of one type, 2 m apart."""
+    """Return a scene of n equal vehicles, 2 m apart."""
     entries = [f'[[vehicle]]\nairframe = "delivery_drone"\ninitial_position = [0.0, {2.0 * i}]\n' for i in range(n)]
     return parse(tmp_path / "many.toml", COMMON + "".join(entries))
 
@@ -57,7 +57,7 @@ def flown(setup):
 
 
 @pytest.mark.parametrize("vehicle", ["left", "right", "scout"])
-def test_vehicle_of_fleet_publishes_as_alone(vehicle, setup, flown):
+def test_vehicle_in_fleet_publishes_as_alone(vehicle, setup, flown):
     alone = fly(member(setup, vehicle))
     own = {name: topic for name, topic in alone.topics.items() if topic not in (CLOCK, TF)}
     assert {name for name in flown.topics if name.startswith(f"{vehicle}/")} == {f"{vehicle}/{name}" for name in own}
@@ -68,8 +68,8 @@ def test_vehicle_of_fleet_publishes_as_alone(vehicle, setup, flown):
     assert [payload for _, payload in alone.payloads("tf")] == transforms[setup.vehicles.index(vehicle) :: 3]
 
 
-def test_random_numbers_go_by_vehicle(flown):
-    """Two of one type under the same law: what differs beside their place is the wind, drawn for each."""
+def test_random_numbers_differ_by_vehicle(flown):
+    """Compare two equal vehicles under the same law, which differ in position and wind only."""
     left, right = (flown.view(f"{name}/ground_truth").wind for name in ("left", "right"))
     assert (left != right).any()
 
@@ -81,13 +81,13 @@ def test_vehicle_and_path_start_at_initial_position(flown):
     assert flown.view("scout/estimate").position[0, :2] == pytest.approx((-3.0, 0.0), abs=0.1)
 
 
-def test_diagram_per_service_gives_equal_results(setup, flown):
+def test_separate_diagrams_have_equal_results(setup, flown):
     apart = fly_apart(setup, None)
     assert apart.topics.keys() == flown.topics.keys()
     assert apart.digest == flown.digest
 
 
-def test_second_vehicle_of_type_compiles_no_kernel(tmp_path):
+def test_additional_vehicle_of_type_compiles_no_kernel(tmp_path):
     two, three = (resolve(fleet_of(n, tmp_path)) for n in (2, 3))
     BlockDiagram(two, create_all(two), PAGE).advance(1)
     compiled = []
@@ -96,8 +96,8 @@ def test_second_vehicle_of_type_compiles_no_kernel(tmp_path):
     assert compiled == []
 
 
-class Asked:
-    """A part in Python that keeps at which ticks it was asked."""
+class Waking:
+    """Python block that notes its ticks."""
 
     name, outputs = "asked", ()
 
@@ -112,8 +112,8 @@ class Asked:
         return NEVER
 
 
-def test_python_blocks_are_per_vehicle_and_last_one_ends_run():
-    requested = Asked("a"), Asked("b")
+def test_python_blocks_wake_per_vehicle_until_last_vehicle_ends():
+    requested = Waking("a"), Waking("b")
     signals = {"a": Signals(5, 7), "b": Signals(2, 9)}
     compiled = [Block(name, p, Cell(0.0), vehicle=name) for name, p in signals.items()]
     graph = graph_of(*compiled, *requested)
@@ -138,13 +138,13 @@ def test_invalid_state_error_names_vehicle(setup):
     assert (type(error), str(error)) == (DivergedError, "right: not finite at tick 3")
 
 
-def test_names_and_systems_are_numbered(tmp_path):
+def test_names_and_system_ids_are_numbered(tmp_path):
     scene = fleet_of(3, tmp_path)
     assert [vehicle.lookup("vehicle.name") for vehicle in scene.vehicles] == ["drone1", "drone2", "drone3"]
     assert [vehicle.lookup("mavlink.system_id") for vehicle in scene.vehicles] == [1, 2, 3]
 
 
-def test_topics_of_vehicle_of_fleet():
+def test_topics_have_prefix_of_vehicle():
     assert of_vehicle(IMU, "left") is topic_named("left/imu")
     assert (topic_named("left/imu").key(), of_vehicle(TF, "left")) == ("/left/imu", TF)
     assert topic_named("left/custom_sensor/x") is of_vehicle(custom_sensor("x"), "left")

@@ -1,4 +1,4 @@
-"""The rule of what is due when, in Python and compiled; and the order in which services step."""
+"""Due ticks of samples, in Python and compiled, and the execution order of services."""
 
 from pathlib import Path
 
@@ -15,12 +15,12 @@ SCENES = sorted((Path(__file__).parents[3] / "lapwing/scenes").glob("*.toml"))
 
 
 def stamps(period, stop):
-    """The ticks before `stop` at which a producer gives a message, or keeps one."""
+    """Return the ticks before `stop` with a sample of a producer."""
     return range(0, stop, max(1, period))
 
 
 @given(st.integers(0, 5000), st.integers(0, 60), st.integers(0, 60))
-def test_message_is_due_its_delay_after_its_stamp(tick, period, delay):
+def test_sample_is_due_after_its_delay(tick, period, delay):
     expected = tick - delay if tick - delay in stamps(period, tick + 1) else -1
     assert due.py_func(tick, period, delay) == expected
 
@@ -36,17 +36,17 @@ def test_compiled_and_python_rule_agree():
     ("tick", "period", "delay", "stamp"),
     [
         (0, 1, 0, 0),
-        (0, 1, 1, -1),  # nothing before the first tick
+        (0, 1, 1, -1),  # no sample before the first tick
         (1, 1, 1, 0),
         (10, 5, 0, 10),
         (11, 5, 0, -1),
-        (11, 5, 1, 10),  # late by one tick
+        (11, 5, 1, 10),  # one tick of delay
         (3, 5, 4, -1),
         (7, LATCHED, 0, 7),
         (7, LATCHED, 3, 4),
     ],
 )
-def test_examples(tick, period, delay, stamp):
+def test_due_stamp_of_examples(tick, period, delay, stamp):
     assert due.py_func(tick, period, delay) == stamp
 
 
@@ -69,7 +69,7 @@ def test_execution_order_is_independent_of_naming_order():
     assert order(dict(reversed(loop.items())), dict(reversed(GIVES.items()))) == order(loop, GIVES)
 
 
-def test_own_port_as_input_is_no_loop():
+def test_own_output_as_input_is_no_loop():
     assert order({"plant": [("truth",)]}, {"plant": ["truth"]}) == ["plant"]
 
 
@@ -87,7 +87,7 @@ def test_input_without_producer_is_named_with_consumer():
 
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
 @pytest.mark.parametrize("coupling", ["gauss_seidel", "jacobi"])
-def test_every_scene_has_order(path, coupling):
+def test_every_scene_has_execution_order(path, coupling):
     setup = resolve(load(path, [f"communication.coupling={coupling}"]))
     assert sorted(setup.order) == sorted(setup.services)
     place = {name: i for i, name in enumerate(setup.order)}

@@ -1,4 +1,4 @@
-"""Pages of messages are, byte for byte, the messages of the single values; their texts may change from row to row."""
+"""Record batches equal the messages of single values byte for byte, also with texts that change between rows."""
 
 from pathlib import Path
 from types import SimpleNamespace
@@ -46,7 +46,7 @@ WORDS = (
 
 
 def random_value(like, random):
-    """A tree like another, of random numbers; integers are 0, 1 or 2."""
+    """Return a tree like `like` with random numbers; integers are 0, 1 or 2."""
     if isinstance(like, tuple):
         items = [random_value(item, random) for item in like]
         return type(like)(*items) if hasattr(like, "_fields") else tuple(items)
@@ -66,7 +66,7 @@ def known(setup, services):
         for text in ("up", "along", "down"):
             commander.phases.number(text)
         phases, words = commander.phases.table, commander.status_texts.table
-    if link := next((p for s in services for p in s.parts if hasattr(p, "reports")), None):  # of a foreign firmware
+    if link := next((p for s in services for p in s.parts if hasattr(p, "reports")), None):  # foreign firmware
         link.status_texts.table += WORDS
         phases, words = phases or ("",), link.status_texts.table
     wiring = values["plant"].wiring
@@ -79,7 +79,7 @@ def known(setup, services):
 
 
 def fitting(value, texts, random):
-    """A value whose numbers of texts are among these, and whose bits of refused sources are any."""
+    """Return the value with a valid text number, and any combination of rejected sources."""
     if "rejected" in value._fields:
         return value._replace(rejected=int(random.integers(128)))
     return value._replace(phase=value.phase % len(texts)) if "phase" in value._fields else value
@@ -114,14 +114,14 @@ def test_contact_forces_equal_scalar_encoding():
     check_every_topic(resolve(load("hover", ["rates.contact_forces=50"])), np.random.default_rng(5))
 
 
-def test_details_of_satellites_equal_scalar_encoding():
+def test_satellite_details_equal_scalar_encoding():
     check_every_topic(resolve(load("quad_x", [SATELLITES])), np.random.default_rng(5))
 
 
 def test_scenes_cover_all_topics():
     requested = load(
         "bridge", ["autopilot.accept_commands=true", "rates.contact_forces=50"]
-    )  # tells what it got of the airspeed, too
+    )  # publishes received airspeed, too
     clouds = load("bridge", ["sensors.lidar.preset=vlp16", "sensors.depth_camera.preset=ideal"])
     rings = load("bridge", ["sensors.lidar.preset=rplidar_a2"])
     satellites = load("quad_x", [SATELLITES])
@@ -133,13 +133,13 @@ def test_scenes_cover_all_topics():
 
 
 class Named(NamedTuple):
-    """A number and which text goes with it."""
+    """Number and index of its text."""
 
     number: float
     text: int
 
 
-def test_page_falls_into_parts_of_same_texts_each_in_order():
+def test_batch_is_split_by_text_in_order_of_ticks():
     texts = ["climb", "on the way", "climb again"]
     setup = SimpleNamespace(interval_ns=4_000_000)
     wire = TopicEncoder(

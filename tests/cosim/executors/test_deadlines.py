@@ -13,7 +13,7 @@ from lapwing.studies.report.flight_header import facts
 pytestmark = pytest.mark.long
 
 
-def test_ticks_that_are_late_are_counted_and_worst_is_kept():
+def test_late_ticks_are_counted_and_worst_lateness_is_kept():
     deadlines = Deadlines()
     for late in (-1e-3, 2e-3, 0.0, 5e-3, 1e-3):
         deadlines.note(late)

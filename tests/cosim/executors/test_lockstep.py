@@ -8,7 +8,7 @@ import pytest
 
 from lapwing.cosim.executors.lockstep import batch
 
-TOLD = """
+POLICIES = """
 import os, threading
 from lapwing.cosim.executors.lockstep import batch
 threading.Thread(target=threading.Event().wait, daemon=True).start()
@@ -18,13 +18,13 @@ print(*{os.sched_getscheduler(int(thread)) for thread in os.listdir("/proc/self/
 
 
 @pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="no such class")
-def test_all_threads_of_ordinary_process_are_batch_work():
-    reported = subprocess.run([sys.executable, "-c", TOLD], capture_output=True, text=True, check=True).stdout
+def test_all_threads_have_batch_scheduling_policy():
+    reported = subprocess.run([sys.executable, "-c", POLICIES], capture_output=True, text=True, check=True).stdout
     assert reported.split() == [str(os.SCHED_BATCH)]
 
 
 @pytest.mark.skipif(not hasattr(os, "SCHED_BATCH"), reason="no such class")
-def test_scheduling_class_of_user_is_kept(monkeypatch):
+def test_scheduling_policy_of_user_is_kept(monkeypatch):
     monkeypatch.setattr(os, "sched_getscheduler", lambda process: os.SCHED_IDLE)
     monkeypatch.setattr(os, "sched_setscheduler", lambda *_: pytest.fail("it was changed"))
     batch()

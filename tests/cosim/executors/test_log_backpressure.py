@@ -1,4 +1,4 @@
-"""A run is held while it is too far ahead of its log, and says what it waits for."""
+"""A run waits while it is too far ahead of its log, and reports that it waits for the log."""
 
 import struct
 import threading
@@ -23,23 +23,23 @@ from lapwing.messages import Clock, stamp
 
 
 class Bus:
-    """A bus to oneself."""
+    """Bus that returns its own messages."""
 
     def __init__(self):
-        self.said = []
+        self.sent = []
 
     def publisher(self, key):
-        return lambda payload, time_ns: self.said.append(payload)
+        return lambda payload, time_ns: self.sent.append(payload)
 
     def receive(self, senders):
         return self
 
     def get(self, timeout):
-        return (0, self.said.pop(0)) if self.said else None
+        return (0, self.sent.pop(0)) if self.sent else None
 
 
 class Process:
-    """A participant that is told that 3000 ticks more are recorded whenever it has to wait."""
+    """Participant whose log advances by 3000 ticks during each wait."""
 
     participants = PublisherIds("test")
 
@@ -54,41 +54,41 @@ class Process:
 
 def test_run_waits_while_log_is_behind():
     process = Process()
-    held, teller = LogBackpressure(process, "recorder"), LogProgressPublisher(process.bus, "test", "recorder")
-    for tick in range(0, 10 * AHEAD, LOOK):  # nobody records
-        held.wait_for_log(tick)
+    pressure, progress = LogBackpressure(process, "recorder"), LogProgressPublisher(process.bus, "test", "recorder")
+    for tick in range(0, 10 * AHEAD, LOOK):  # without a recorder
+        pressure.wait_for_log(tick)
     assert process.waits == []
-    teller.recorded(0)
-    held.wait_for_log(AHEAD - LOOK)
+    progress.recorded(0)
+    pressure.wait_for_log(AHEAD - LOOK)
     assert process.waits == []
-    held.wait_for_log(AHEAD)
+    pressure.wait_for_log(AHEAD)
     assert process.waits == ["the log, recorded up to tick 0"]
-    held.wait_for_log(AHEAD + 6144)
+    pressure.wait_for_log(AHEAD + 6144)
     assert process.waits[1:] == ["the log, recorded up to tick 3000", "the log, recorded up to tick 6000"]
 
 
 @pytest.mark.parametrize(("vehicles", "ahead"), [(1, AHEAD), (2, AHEAD // 2), (50, LEAST)])
-def test_more_vehicles_run_has_fewer_ticks_wait_for_its_log(vehicles, ahead):
+def test_allowed_lead_over_log_shrinks_with_vehicles(vehicles, ahead):
     process = Process(vehicles)
-    held, teller = LogBackpressure(process, "recorder"), LogProgressPublisher(process.bus, "test", "recorder")
-    teller.recorded(0)
-    held.wait_for_log(ahead - LOOK)
+    pressure, progress = LogBackpressure(process, "recorder"), LogProgressPublisher(process.bus, "test", "recorder")
+    progress.recorded(0)
+    pressure.wait_for_log(ahead - LOOK)
     assert process.waits == []
-    held.wait_for_log(ahead)
+    pressure.wait_for_log(ahead)
     assert process.waits
 
 
-def test_waiting_run_has_published_all_needed_log_packets():
-    assert LEAST >= PAGE + LOOK + SHORTEST  # a batch that is not yet handed over, and a chunk that is not yet full
+def test_allowed_lead_covers_unrecorded_ticks():
+    assert LEAST >= PAGE + LOOK + SHORTEST  # an unsent log packet and an incomplete chunk
 
 
 def test_progress_reports_waiting_for_disk():
     bus = Bus()
-    teller = LogProgressPublisher(bus, "test", "recorder")
-    teller.recorded(7)
-    teller.waiting()
-    assert [waits_for_disk(payload) for payload in bus.said] == [False, True]
-    assert log_backpressure._PROGRESS.unpack(bus.said[1])[0] == 7
+    progress = LogProgressPublisher(bus, "test", "recorder")
+    progress.recorded(7)
+    progress.waiting()
+    assert [waits_for_disk(payload) for payload in bus.sent] == [False, True]
+    assert log_backpressure._PROGRESS.unpack(bus.sent[1])[0] == 7
 
 
 def test_slow_disk_is_reported_and_one_chunk_is_buffered(tmp_path, monkeypatch):

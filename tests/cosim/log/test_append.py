@@ -1,4 +1,4 @@
-"""A topic behind the others of a log: in order of time for every reader, and the log as it was where it cannot be."""
+"""Topic appended to a log: read in order of time; the log is unchanged if the topic cannot be added."""
 
 import pytest
 from mcap.reader import make_reader
@@ -63,7 +63,7 @@ def test_failed_append_leaves_log_unchanged(log, monkeypatch):
     assert log.read_bytes() == whole
 
 
-def test_log_without_end_or_with_topic_is_refused(log):
+def test_incomplete_log_or_existing_topic_is_rejected(log):
     with pytest.raises(ValueError, match="already has a topic /clock"):
         append(log, "/clock", Clock, [(1, Clock().encode())])
     log.write_bytes(log.read_bytes()[:-20])

@@ -1,4 +1,4 @@
-"""The index of a log's chunks: the same bytes in memory and in a file, and no memory for chunk after chunk."""
+"""Chunk index of a log: equal bytes in memory and in a file, with bounded memory."""
 
 import tracemalloc
 
@@ -27,7 +27,7 @@ def write(path, pages):
     return path
 
 
-def test_many_chunks_have_index_of_few(tmp_path, monkeypatch):
+def test_index_in_file_equals_index_in_memory(tmp_path, monkeypatch):
     few = write(tmp_path / "few.mcap", 50)
     monkeypatch.setattr(chunk_indexes, "IN_MEMORY", 100)
     assert write(tmp_path / "many.mcap", 50).read_bytes() == few.read_bytes()
@@ -55,7 +55,7 @@ def test_memory_does_not_grow_with_chunks(tmp_path, monkeypatch):
     assert taken[1] - taken[0] < 10_000  # [bytes] for 300 chunks
 
 
-def test_index_that_cannot_be_written_is_not_counted(tmp_path, monkeypatch):
+def test_unwritable_index_is_not_counted(tmp_path, monkeypatch):
     monkeypatch.setattr(chunk_indexes, "IN_MEMORY", 4)
     indexes = ChunkIndexes(tmp_path / "missing")
     indexes.add(b"abc", 5, 7)

@@ -1,4 +1,4 @@
-"""A log of version 0.1.0, recorded before modules, classes and scene keys were renamed (commit f1c8295)."""
+"""Log of version 0.1.0, recorded before modules, classes and scene keys were renamed (commit f1c8295)."""
 
 import gzip
 import json
@@ -74,7 +74,7 @@ def test_command_accepts_former_log(log, tmp_path, command):
 
 @pytest.mark.long
 def test_resimulated_former_contact_has_another_digest(log, tmp_path):
-    """The law of friction was mended: a vehicle that stands on the ground flies again, but not to the bit."""
+    """The friction law was corrected since, so a vehicle on the ground does not move bit for bit as before."""
     done = run(log, tmp_path, "resimulate")
     assert done.returncode == 1
     assert "digests differ: recorded" in done.stderr
@@ -95,7 +95,7 @@ def test_former_tables_resolve_to_present_scene(name):
         if entry["success"]["require"] == ["outcome != 'crashed'", "outcome != 'diverged'"]:  # default of 0.1.0
             entry["success"] = other["success"]
         motor = entry.get("airframe", {}).get("motor", {})
-        if motor.get("peak_current") == 29.7:  # of the 24 V column beside the power of the 48 V column, corrected since
+        if motor.get("peak_current") == 29.7:  # current at 24 V with power at 48 V, corrected since
             motor["peak_current"] = 26.5
     assert tables == default
 
@@ -105,7 +105,7 @@ def test_present_tables_keep_their_names():
         assert present_tables(scene.resolved) == scene.resolved
 
 
-def test_former_keys_lead_to_present_tables_and_fields():
+def test_former_keys_map_to_present_tables_and_fields():
     assert set(former_names()["keys"]) <= set(vocabulary().sections)
     for name, renamed in former_names()["fields"].items():
         assert set(renamed.values()) - {"square_stiction_velocity"} <= set(_fields(_class_of(name, [])))
@@ -114,7 +114,7 @@ def test_former_keys_lead_to_present_tables_and_fields():
 
 
 @pytest.mark.parametrize("name", [*(f"{module}:x" for module in former_names()["modules"]), *former_names()["classes"]])
-def test_alias_leads_to_present_module_and_class(name):
+def test_alias_maps_to_present_module_and_class(name):
     module, _, path = present_name(name).partition(":")
     assert module.startswith("lapwing.")
     __import__(module)
@@ -123,7 +123,7 @@ def test_alias_leads_to_present_module_and_class(name):
 
 
 def test_airspeed_error_in_former_log_becomes_static_pressure_error():
-    """A log of before: one share of the dynamic pressure, a field of the parameters and a key of the scene."""
+    """Former logs have one share of the dynamic pressure, in the parameters and in the scene."""
     table = {"sensors": {"barometer": {"airspeed_error": 0.2}}}
     assert present_tables(table)["sensors"]["barometer"] == {"static_pressure_error": dict.fromkeys(DIRECTIONS, 0.2)}
     assert StaticPressureError._fields == DIRECTIONS
@@ -133,7 +133,7 @@ def test_airspeed_error_in_former_log_becomes_static_pressure_error():
         assert from_json(json.dumps(former | {"airspeed_error": share})) == Barometer(static_pressure_error=error)
 
 
-def test_declared_module_may_have_name_of_former_package(tmp_path, monkeypatch):
+def test_user_module_may_have_name_of_former_package(tmp_path, monkeypatch):
     (tmp_path / "dynamics.py").write_text("from typing import NamedTuple\nclass Gains(NamedTuple):\n    p: float\n")
     monkeypatch.syspath_prepend(tmp_path)
     assert _class_of("dynamics:Gains", ["dynamics"]).__module__ == "dynamics"

@@ -1,4 +1,4 @@
-"""A recording gives the same file whenever its pages come, and what has come is in the file after half a second."""
+"""A log file does not depend on the arrival of record batches, which are in the file after half a second."""
 
 import io
 import random
@@ -17,7 +17,7 @@ from lapwing.messages import Clock, Imu, header
 from lapwing.messages.cdr_arrays import Record, stamp_columns
 from lapwing.messages.topics import CLOCK, IMU
 
-TICKS, TICK = 2500, 4_000_000  # the ticks' length in ns
+TICKS, TICK = 2500, 4_000_000  # number of ticks, length of a tick [ns]
 SETUP = RunConfig("made_up", "", 1, TICKS - 1, 250, TICK, "gauss_seidel", "drone1", {}, {}, {})
 
 
@@ -48,7 +48,7 @@ def stopped_clock(monkeypatch):
 
 
 @pytest.mark.usefixtures("stopped_clock")
-def test_file_is_same_whenever_pages_come(tmp_path):
+def test_file_is_independent_of_arrival_of_batches(tmp_path):
     whole = record(tmp_path / "a", [1000, 2000, TICKS])
     rng = random.Random(1)
     for k in range(3):
@@ -56,8 +56,8 @@ def test_file_is_same_whenever_pages_come(tmp_path):
         assert record(tmp_path / "b", stops, shuffle=bool(k % 2)) == whole
 
 
-def test_two_files_differ_in_wall_time_only(tmp_path, monkeypatch):
-    """Also where what has come is brought into the file, again and again, before a chunk is complete."""
+def test_provisional_chunks_change_wall_time_only(tmp_path, monkeypatch):
+    """Compare files with and without provisional chunks."""
     one = record(tmp_path / "a", [1000, 2000, TICKS])
     monkeypatch.setattr("lapwing.cosim.log.log_sequencer.FLUSH_PERIOD", -1.0)
     other = record(tmp_path / "b", [*range(100, TICKS, 100), TICKS])
@@ -69,7 +69,7 @@ def test_two_files_differ_in_wall_time_only(tmp_path, monkeypatch):
         assert a.data == b.data or a.compression == b.compression == ""
     wall = [
         (one.index(c.data) - 29, one.index(c.data) + len(c.data)) for c in chunks[0] if not c.compression
-    ]  # with its checksum
+    ]  # including the checksum
     differing = np.flatnonzero(np.frombuffer(one, np.uint8) != np.frombuffer(other, np.uint8))
     assert all(any(first <= place < stop for first, stop in wall) for place in differing.tolist())
 
@@ -91,21 +91,21 @@ def test_incomplete_chunk_is_in_file(tmp_path, monkeypatch):
     for first, stop in ((100, 200), (200, 300), (300, CHUNK + 50), (CHUNK + 50, CHUNK + 60)):
         now[0] += 0.6
         recording.write(pages(first, stop), stop - 1)
-        assert ticks() == list(range(CHUNK if first == 300 else stop))  # what is new after a chunk waits again
+        assert ticks() == list(range(CHUNK if first == 300 else stop))  # messages after a complete chunk wait
     recording.finish()
     writer.close()
     with open(path, "rb") as file:
         reader = make_reader(file, validate_crcs=True)
         result = [(m.log_time // TICK, m.sequence) for _, c, m in reader.iter_messages() if c.topic == "/drone1/imu"]
         assert result == [(k, k) for k in range(CHUNK + 60)]
-        assert reader.get_summary().statistics.chunk_count == 2 + 3  # of pages, and of the wall time
+        assert reader.get_summary().statistics.chunk_count == 2 + 3  # record batches and wall time
     with LogReader(path) as log:
         assert log.complete
         assert log.digest() == log.metadata["digest"]
 
 
 def test_slow_provisional_chunk_is_written_rarely(tmp_path, monkeypatch):
-    """Else a recorder that has fallen behind writes the same chunk again and again, and never catches up."""
+    """Otherwise a late recorder would write the same chunk repeatedly and never catch up."""
     now, tails = [0.0], []
     monkeypatch.setattr("lapwing.cosim.log.log_sequencer.time.monotonic", lambda: now[0])
 

@@ -1,4 +1,4 @@
-"""Parts with arrays: one that changes them in place, and one that makes new ones."""
+"""Block that changes an array in place."""
 
 from typing import NamedTuple
 
@@ -9,13 +9,13 @@ from lapwing.kernels import always_inline, kernel, noinline
 
 
 class Mean(NamedTuple):
-    """The weighted sum of the last ticks."""
+    """Weights of the sum of the last ticks."""
 
     weights: np.ndarray  # (n,)
 
 
 class Last(NamedTuple):
-    """The last ticks, and how often they were written."""
+    """Last ticks and number of steps."""
 
     ticks: np.ndarray  # (n,)
     count: int
@@ -37,7 +37,7 @@ def _weighted(p, s):
 
 @always_inline
 def step(p, s, tick, inputs):
-    """The sum, the tick taken in."""
+    """Store the tick and return the weighted sum."""
     s.ticks[tick % len(s.ticks)] = tick
     total, s = _weighted(p, s)
     return Last(s.ticks, s.count + 1), (Sum(total),), CONTINUE
@@ -45,5 +45,5 @@ def step(p, s, tick, inputs):
 
 @kernel
 def weighted(p, s):
-    """The sum and the state, for Python: by a function that parts call, too."""
+    """Return the sum and the state to Python, from a function that the block calls, too."""
     return _weighted(p, s)

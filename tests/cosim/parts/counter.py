@@ -1,4 +1,4 @@
-"""A part that counts its steps, ends at one tick and fails at another."""
+"""Block that counts its steps, finishes at one tick and fails at another."""
 
 from typing import NamedTuple
 
@@ -7,7 +7,7 @@ from lapwing.kernels import always_inline
 
 
 class Counter(NamedTuple):
-    """Parameters: ticks and their statuses."""
+    """Ticks at which the block finishes and fails."""
 
     last: int  # tick
     fails: int = 10_000  # tick
@@ -15,5 +15,5 @@ class Counter(NamedTuple):
 
 @always_inline
 def step(p, s, tick, inputs):
-    """The steps so far."""
+    """Return the number of earlier steps."""
     return s + 1, (s,), NON_FINITE if tick == p.fails else FINISHED if tick >= p.last else CONTINUE

@@ -1,4 +1,4 @@
-"""A part that gives what it has received, and whether that was due."""
+"""Block that returns its input and whether it was due."""
 
 from typing import Any, NamedTuple
 
@@ -7,13 +7,13 @@ from lapwing.kernels import always_inline
 
 
 class Echo(NamedTuple):
-    """A part of one input."""
+    """Parameter, copied to the output."""
 
     sign: float
 
 
 class Heard(NamedTuple):
-    """Samples received at a tick."""
+    """Sample received at a tick."""
 
     due: bool
     value: Any
@@ -22,6 +22,6 @@ class Heard(NamedTuple):
 
 @always_inline
 def step(p, s, tick, inputs):
-    """Give the input's message on."""
+    """Return the sample of the input."""
     r = inputs[0]
     return s, (Heard(r.due, r.value, p.sign),), CONTINUE

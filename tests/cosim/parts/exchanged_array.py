@@ -1,4 +1,4 @@
-"""A part that puts an array of its parameters into its state."""
+"""Block that puts an array of its parameters into its state."""
 
 from typing import NamedTuple
 
@@ -10,12 +10,12 @@ from tests.cosim.parts.arrays import Last, Sum
 
 
 class Exchange(NamedTuple):
-    """The weights, which become what is remembered."""
+    """Weights, which replace the array of the state."""
 
     weights: np.ndarray  # (n,)
 
 
 @always_inline
 def step(p, s, tick, inputs):
-    """The first of what is remembered."""
+    """Return the first number of the state."""
     return Last(p.weights, s.count + 1), (Sum(s.ticks[0]),), CONTINUE

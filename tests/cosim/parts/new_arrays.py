@@ -1,4 +1,4 @@
-"""A part that makes an array at every tick."""
+"""Block that allocates an array at every tick."""
 
 from typing import NamedTuple
 
@@ -10,13 +10,13 @@ from tests.cosim.parts.arrays import Last, Sum
 
 
 class Squares(NamedTuple):
-    """The sum of the squares up to the tick, in an array of its own."""
+    """Size of the array of squares."""
 
     size: int
 
 
 @always_inline
 def step(p, s, tick, inputs):
-    """The sum of the squares."""
+    """Return the sum of the squares."""
     squares = np.arange(p.size) ** 2.0
     return Last(squares, s.count + 1), (Sum(squares.sum()),), CONTINUE

@@ -1,4 +1,4 @@
-"""A part that gives a tree of every kind of number, counted in its state, and signals at given ticks."""
+"""Block that returns a tree of every kind of number and requests statuses at given ticks."""
 
 from typing import NamedTuple
 
@@ -8,7 +8,7 @@ from lapwing.kernels import always_inline
 
 
 class Place(NamedTuple):
-    """A tree within a tree."""
+    """Nested tree."""
 
     position: Vec3
     seen: bool
@@ -28,7 +28,7 @@ LIKE = Reading(0.0, False, 0, (Place((0.0,) * 3, False),) * 2, (0, 0))
 
 
 class Readings(NamedTuple):
-    """Parameters: outputs and statuses."""
+    """Factor of the output, and ticks of the statuses."""
 
     factor: float
     look_every: int = 0  # ticks; 0: never
@@ -45,7 +45,7 @@ def expected(factor, tick, count):
 
 @always_inline
 def step(p, s, tick, inputs):
-    """Count, and give what comes of the tick and the count."""
+    """Return the output of the present tick and count."""
     n, t = s + 1, float(tick)
     near, far = Place((p.factor * t, -t, 0.5), tick % 2 == 0), Place((0.25, t * t, 1e-300), tick % 3 == 0)
     values = Reading(p.factor * t, tick % 5 == 0, -n, (near, far), (n, 3 - tick))

@@ -1,4 +1,4 @@
-"""A part that adds up a port of one number; parts of one state share it."""
+"""Block that sums a port of one number; blocks may share the state."""
 
 from typing import NamedTuple
 
@@ -7,19 +7,19 @@ from lapwing.kernels import always_inline
 
 
 class Number(NamedTuple):
-    """A port of one number."""
+    """Port of one number."""
 
     value: float
 
 
 class RunningSum(NamedTuple):
-    """The weight of what is added."""
+    """Weight of the input."""
 
     weight: float
 
 
 @always_inline
 def step(p, s, tick, inputs):
-    """Add the message that is due."""
+    """Add a due sample."""
     s += p.weight * inputs[0].value.value if inputs[0].due else 0.0
     return s, (Number(s),), CONTINUE

@@ -1,4 +1,4 @@
-"""A part that signals that Python is to have a say at one tick, and the end at another."""
+"""Block that wakes Python at one tick and finishes at another."""
 
 from typing import NamedTuple
 
@@ -7,7 +7,7 @@ from lapwing.kernels import always_inline
 
 
 class Signals(NamedTuple):
-    """Parameters: ticks and their statuses."""
+    """Ticks of the statuses."""
 
     look: int  # tick
     last: int  # tick
@@ -15,5 +15,5 @@ class Signals(NamedTuple):
 
 @always_inline
 def step(p, s, tick, inputs):
-    """It gives nothing."""
+    """Return no output."""
     return s, (), FINISHED if tick >= p.last else WAKE_PYTHON if tick == p.look else CONTINUE

@@ -1,4 +1,4 @@
-"""Processes that are started before it is known what they are given."""
+"""Child processes: early start before the run configuration is known, forks, and their ends."""
 
 import os
 import signal
@@ -16,20 +16,20 @@ from lapwing.cosim.processes.forked_process import Forked
 
 def test_unused_early_child_is_terminated():
     with start_early(["mavlink", "recorder"]) as early:
-        taken, left = early.pop("mavlink"), early["recorder"]
-        assert taken.process.poll() is None
-    assert left.process.poll() is not None
-    assert left.output.closed
+        used, unused = early.pop("mavlink"), early["recorder"]
+        assert used.process.poll() is None
+    assert unused.process.poll() is not None
+    assert unused.output.closed
     try:
-        assert taken.process.poll() is None
-        taken.process.stdin.close()
-        assert taken.process.wait(60.0) == 1  # nobody will tell it what to do
-        taken.output.seek(0)
-        assert taken.output.read() == b""
+        assert used.process.poll() is None
+        used.process.stdin.close()
+        assert used.process.wait(60.0) == 1  # it received no configuration
+        used.output.seek(0)
+        assert used.output.read() == b""
     finally:
-        taken.process.kill()
-        taken.process.wait()
-        taken.output.close()
+        used.process.kill()
+        used.process.wait()
+        used.output.close()
 
 
 def code_of(run):
@@ -68,7 +68,7 @@ def test_fork_exits_like_separate_program():
 
 
 @pytest.mark.parametrize(("end", "number"), [("kill", signal.SIGKILL), ("send_signal", signal.SIGTERM)])
-def test_fork_is_ended_by_signal_and_then_let_alone(end, number):
+def test_fork_is_ended_by_signal_and_may_be_killed_twice(end, number):
     with tempfile.TemporaryFile() as output:
         child = Forked(lambda: time.sleep(60.0), output)
         child.stdin.close()
@@ -79,11 +79,11 @@ def test_fork_is_ended_by_signal_and_then_let_alone(end, number):
         child.kill()
 
 
-def test_fork_has_no_other_files_open():
-    """Its launcher's end of the standard input of another one would keep that one waiting when the launcher is gone."""
-    with tempfile.TemporaryFile() as first_said, tempfile.TemporaryFile() as second_said:
-        first = Forked(lambda: os.read(0, 1), first_said)
-        second = Forked(lambda: time.sleep(60.0), second_said)
+def test_fork_closes_files_of_other_forks():
+    """A fork with another child's standard input open would prevent that child's end after the launcher's."""
+    with tempfile.TemporaryFile() as first_output, tempfile.TemporaryFile() as second_output:
+        first = Forked(lambda: os.read(0, 1), first_output)
+        second = Forked(lambda: time.sleep(60.0), second_output)
         first.stdin.close()
         assert first.wait(60.0) == 0
         second.kill()

@@ -1,4 +1,4 @@
-"""A process that gets no processor is told from one that is stopped, sleeps, or runs without end."""
+"""Detection of processes that wait for a processor, unlike stopped, sleeping or endless ones."""
 
 import os
 import signal
@@ -28,7 +28,7 @@ SLEEP = "import time\nprint(flush=True)\ntime.sleep(60)"
 
 @pytest.fixture
 def start():
-    """Starts Python programs, and ends them all."""
+    """Yield a function that starts Python programs; kill the programs at the end."""
     children = []
 
     def begin(program, *arguments):
@@ -58,7 +58,7 @@ def test_only_starved_process_extends_wait(start):
     assert measured(start(SLEEP)) < 0.1
     stopped = start(SPIN, core, 10)
     os.kill(stopped, signal.SIGSTOP)
-    os.waitpid(stopped, os.WUNTRACED)  # it stops once it is given the processor
+    os.waitpid(stopped, os.WUNTRACED)  # a process needs the processor to stop
     assert measured(stopped) < 0.1
 
 
@@ -69,7 +69,7 @@ def test_exited_process_has_no_waiting_time():
 
 
 def test_stall_of_machine_sums_its_counts(monkeypatch, tmp_path):
-    """Numbers of the format in the kernel's documentation (accounting/psi, filesystems/proc)."""
+    """Numbers in the format of the kernel's documentation (accounting/psi, filesystems/proc)."""
     assert machine_stall_time() >= 0.0
     (tmp_path / "io").write_text("some avg10=0.10 avg60=0.00 avg300=0.00 total=2500000\nfull avg10=0.00 total=1\n")
     (tmp_path / "stat").write_text("cpu  1 2 3 4 5 6 7 300 9 10\ncpu0 1 2 3 4 5 6 7 8 9 10\n")
@@ -91,7 +91,7 @@ def test_starvation_counts_from_last_message(monkeypatch):
     starvation.look(pids, 2 * QUIET)
     assert starvation.of(pids) == 1.5
     assert starvation.of(["plant", "somewhere else"]) == 1.0
-    times[2] = 0.0  # a process of the same name that was started in its place
+    times[2] = 0.0  # another process of this name has replaced it
     assert starvation.of(["sensors"]) == 0.0
     stall[0] = 102.0  # the machine waited for its disk
     assert starvation.of(["sensors"]) == 2.0
@@ -102,7 +102,7 @@ def test_starvation_counts_from_last_message(monkeypatch):
 
 @pytest.fixture
 def watch():
-    """A watch of two services that has heard nothing yet."""
+    """Return a monitor of two services that has received no message."""
     bus = SimpleNamespace(receive=lambda senders: None, watch_liveliness=lambda key, seen: None)
     return RunMonitor(bus, PublisherIds("test"), ["plant", "sensors"])
 

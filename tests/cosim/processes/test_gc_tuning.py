@@ -1,4 +1,4 @@
-"""A process ends without looking for garbage; what it has registered for its end still runs."""
+"""A process exits without garbage collection, but with its exit handlers."""
 
 import subprocess
 import sys
@@ -22,6 +22,6 @@ ring = Ring()
 
 
 @pytest.mark.parametrize(("call", "output"), [("", ["at exit", "collected"]), ("relax_gc()", ["at exit"])])
-def test_rings_are_left(call, output):
+def test_relaxed_process_skips_collection_at_exit(call, output):
     ended = subprocess.run([sys.executable, "-c", END.format(call=call)], capture_output=True, text=True, check=True)
     assert ended.stdout.splitlines() == output

@@ -1,4 +1,4 @@
-"""Messages that a run monitor reads on a busy machine."""
+"""Run monitor on a busy machine: pending messages and news."""
 
 from collections import deque
 from types import SimpleNamespace
@@ -11,7 +11,7 @@ SERVICES = ["plant", "sensors"]
 
 
 class Bus:
-    """A bus whose messages have arrived already, read on a machine on which each look at the clock takes a second."""
+    """Bus of pending messages, on a machine on which each reading of the clock takes a second."""
 
     def __init__(self, monkeypatch):
         self.now, self.messages, self.tokens = 0.0, deque(), []

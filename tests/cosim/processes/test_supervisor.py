@@ -19,7 +19,7 @@ NAMES = ["plant", "sensors", "recorder"]
 class Process:
     """A process with a settable exit code."""
 
-    pid = 1 << 30  # of no process of the system
+    pid = 1 << 30  # no process has this id
 
     def __init__(self):
         self.returncode, self.stopped, self.killed = None, False, False

@@ -7,7 +7,7 @@ import pytest
 
 @pytest.fixture
 def write(tmp_path):
-    """Writes a scene file beside a copy of the airframes."""
+    """Return a function that writes a scene file beside a copy of the airframes."""
     shutil.copytree("lapwing/scenes/vehicles", tmp_path / "vehicles")
 
     def write_(text):

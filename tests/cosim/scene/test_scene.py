@@ -42,7 +42,7 @@ def test_settings_by_class_and_by_key():
     assert not scene.has("no such table")
 
 
-def test_overrides_change_values_add_tables_and_reach_into_lists():
+def test_overrides_change_values_tables_and_list_items():
     overrides = [
         "run.seed=7",
         "communication.coupling=jacobi",
@@ -61,14 +61,14 @@ def test_override_accepts_integer_for_float_and_spaces():
     assert load(HOVER, ["run.duration = 3"])[Run].duration == 3.0
 
 
-def test_values_by_key_do_as_well_as_texts():
+def test_override_values_equal_override_texts():
     texts = ["effects.random_wind_force.mean=[3, 1, 0]", "vehicle.name=a", "airframe.mass.total=9.5"]
     for mean in ((3, 1, 0), [3, 1, 0], np.array([3, 1, 0])):
         values = {"effects.random_wind_force.mean": mean, "vehicle.name": "a", "airframe.mass.total": np.float64(9.5)}
         assert load(HOVER, values) == load(HOVER, texts)
 
 
-def test_overrides_reach_into_files_that_scene_names(tmp_path):
+def test_overrides_change_values_of_named_files(tmp_path):
     parameters = tmp_path / "mine.params"
     parameters.write_text("MPC_XY_CRUISE 3.0\nNAV_ACC_RAD 2.0\n")
     overrides = [
@@ -92,7 +92,7 @@ def test_overrides_reach_into_files_that_scene_names(tmp_path):
     assert table(scene)["NAV_ACC_RAD"].default == 4.0
 
 
-def test_scene_may_lay_its_own_values_over_file(write):
+def test_scene_may_override_values_of_file(write):
     scene = load(write(TEXT + "\n[airframe.mass]\ntotal = 9.5\n[gains]\ntilt_limit = 0.3\n"), ["gains.yaw=[1, 2, 3]"])
     assert airframe(scene).mass.total == 9.5
     assert airframe(scene).mass.payload == 2.0
@@ -158,7 +158,7 @@ def test_shipped_scene_is_found_by_name_from_any_folder(tmp_path, monkeypatch):
     assert here == load(HOVER)
     monkeypatch.chdir(tmp_path)
     assert load("hover") == here
-    (tmp_path / "own.toml").write_text(TEXT)  # no folder of airframes beside it
+    (tmp_path / "own.toml").write_text(TEXT)  # without a neighbouring folder of airframes
     assert airframe(load("own.toml")) == airframe(here)
     with pytest.raises(SceneError, match=r"^unknown scene 'hovr'; did you mean hover\? expected one of .*, hover, "):
         load("hovr")

@@ -13,19 +13,19 @@ HOVER, DELIVERY = Path("lapwing/scenes/hover.toml"), Path("lapwing/scenes/delive
 TEXT = HOVER.read_text()
 
 
-def refused(path, *overrides):
+def scene_error(path, *overrides):
     with pytest.raises(SceneError) as caught:
         load(path, overrides)
     assert "\n" not in str(caught.value)
     return caught.value
 
 
-def said(path, *overrides):
-    return str(refused(path, *overrides)).removeprefix(f"{path}:")
+def error_text(path, *overrides):
+    return str(scene_error(path, *overrides)).removeprefix(f"{path}:")
 
 
 def line(text, part):
-    """Number of the first line that starts with `part`."""
+    """Return the number of the first line that starts with `part`."""
     return next(n for n, line in enumerate(text.splitlines(), 1) if line.startswith(part))
 
 
@@ -63,42 +63,42 @@ def line(text, part):
         ),
     ],
 )
-def test_fault_is_named_with_its_line_and_key(write, old, new, at, expected):
+def test_error_has_line_and_key(write, old, new, at, expected):
     assert old in TEXT
     text = TEXT.replace(old, new, 1)
-    fault = said(write(text))
+    fault = error_text(write(text))
     assert fault.startswith(f"{line(text, at)}: ")
     assert expected in fault
 
 
-def test_fault_is_value(write):
+def test_error_has_value(write):
     text = TEXT.replace("duration = 20.0", "duration = -1")
     path = write(text)
-    fault = refused(path)
+    fault = scene_error(path)
     assert (fault.key, fault.message, fault.expected) == (
         "run.duration",
         "got -1",
         "a number above 0 and at most 1e+06 [s]",
     )
     assert fault.source[:3] == (path, line(text, "duration = -1"), None)
-    fault = refused(HOVER, "run.seed=1.5")
+    fault = scene_error(HOVER, "run.seed=1.5")
     assert (fault.key, fault.message) == ("run.seed", "got 1.5")
     assert fault.source == (None, None, "run.seed", "override")
     assert str(pickle.loads(pickle.dumps(fault))) == str(fault)
 
 
 def test_choices_are_listed():
-    assert "rk4" in said(HOVER, "solver.integrator=rk5")
-    assert "mpu6000" in said(DELIVERY, "sensors.imu.preset=none")
-    assert "barometer" in said(DELIVERY, "sensors.compass={}")
-    assert "random_wind_force" in said(HOVER, "effects.wind={}")
-    assert "paper" in said(HOVER, "autopilot.gains=none")
-    assert "delivery_drone" in said(HOVER, "vehicle.airframe=none")
-    assert "unloading" in said(HOVER, "vehicle.model=none")
-    assert "minimum_jerk" in said(HOVER, "trajectory.phase.0.z.kind=none")
-    assert "autopilot" in said(HOVER, "nothing.here=1")
-    assert "expected one of duration, name, release, x, y, yaw, z" in said(HOVER, "trajectory.phase.0.q=1")
-    assert "MPC_XY_CRUISE" in said(HOVER, "autopilot.parameters.MPC_XY_CRUSE=1")
+    assert "rk4" in error_text(HOVER, "solver.integrator=rk5")
+    assert "mpu6000" in error_text(DELIVERY, "sensors.imu.preset=none")
+    assert "barometer" in error_text(DELIVERY, "sensors.compass={}")
+    assert "random_wind_force" in error_text(HOVER, "effects.wind={}")
+    assert "paper" in error_text(HOVER, "autopilot.gains=none")
+    assert "delivery_drone" in error_text(HOVER, "vehicle.airframe=none")
+    assert "unloading" in error_text(HOVER, "vehicle.model=none")
+    assert "minimum_jerk" in error_text(HOVER, "trajectory.phase.0.z.kind=none")
+    assert "autopilot" in error_text(HOVER, "nothing.here=1")
+    assert "expected one of duration, name, release, x, y, yaw, z" in error_text(HOVER, "trajectory.phase.0.q=1")
+    assert "MPC_XY_CRUISE" in error_text(HOVER, "autopilot.parameters.MPC_XY_CRUSE=1")
 
 
 @pytest.mark.parametrize(
@@ -145,27 +145,27 @@ def test_choices_are_listed():
     ],
 )
 def test_bad_override_is_named(override, expected):
-    assert expected in said(HOVER, override)
+    assert expected in error_text(HOVER, override)
 
 
-def test_fault_in_file_that_scene_names_is_named_with_its_line(write, tmp_path):
+def test_error_in_named_file_has_line(write, tmp_path):
     path = write(TEXT)
     vehicle = tmp_path / "vehicles" / "delivery_drone.toml"
     sound = vehicle.read_text()
     vehicle.write_text(sound.replace("total = 10.0224", "total = -1.0"))
     number = line(vehicle.read_text(), "total")
-    assert said(path) == f"{vehicle}:{number}: airframe.mass.total: expected a number above 0 [kg], got -1.0"
+    assert error_text(path) == f"{vehicle}:{number}: airframe.mass.total: expected a number above 0 [kg], got -1.0"
     vehicle.write_text("[mass\n")
-    assert said(path).startswith(f"{vehicle}: not valid TOML: ")
+    assert error_text(path).startswith(f"{vehicle}: not valid TOML: ")
     vehicle.write_bytes(b"\xff")
-    assert "vehicle.airframe: " in said(path)
+    assert "vehicle.airframe: " in error_text(path)
     vehicle.write_text(sound)
     own = tmp_path / "own.toml"
     own.write_text(
         Path("services/autopilot/gains/tuned.toml").read_text().replace("feed_forward = true", "feed_forward = 3")
     )
     number = line(own.read_text(), "feed")
-    assert said(path, "autopilot.gains=own.toml").startswith(f"{own}:{number}: gains.feed_forward: ")
+    assert error_text(path, "autopilot.gains=own.toml").startswith(f"{own}:{number}: gains.feed_forward: ")
 
 
 @pytest.mark.parametrize(
@@ -179,31 +179,31 @@ def test_fault_in_file_that_scene_names_is_named_with_its_line(write, tmp_path):
         ("time,value\n0,0\n", ":2: expected at least two points, got '1'"),
     ],
 )
-def test_fault_in_table_of_trajectory_is_named_with_its_line(write, tmp_path, text, expected):
+def test_error_in_trajectory_table_has_line(write, tmp_path, text, expected):
     csv = tmp_path / "climb.csv"
     csv.write_text(text)
-    fault = said(write(TEXT), 'trajectory.phase.0.z={kind="table", file="climb.csv"}')
+    fault = error_text(write(TEXT), 'trajectory.phase.0.z={kind="table", file="climb.csv"}')
     assert fault == f"{csv}{expected}"
 
 
 def test_trajectory_tables_may_be_missing_or_inline():
-    missing = said(HOVER, 'trajectory.phase.0.z={kind="table", file="none.csv"}')
+    missing = error_text(HOVER, 'trajectory.phase.0.z={kind="table", file="none.csv"}')
     assert missing == "override trajectory.phase.0.z.file: lapwing/scenes/none.csv: no such file or directory"
     values = 'trajectory.phase.0.z={kind="table", points=[[0.0, 0.0], [1.0, 1.0]]}'
     assert load(HOVER, [values])[Trajectory].phase[0].z[0].points == ((0.0, 0.0), (1.0, 1.0))
     later = values.replace("[0.0, 0.0]", "[0.5, 0.0]")
-    assert "trajectory.phase.0.z.points.0.0: expected times that start at 0, got 0.5" in said(HOVER, later)
+    assert "trajectory.phase.0.z.points.0.0: expected times that start at 0, got 0.5" in error_text(HOVER, later)
     above = values.replace("[0.0, 0.0]", "[0.0, 5.0]")
-    assert "put a ramp or a step before it" in said(HOVER, above)
+    assert "put a ramp or a step before it" in error_text(HOVER, above)
 
 
-def test_files_that_are_no_scenes(tmp_path):
-    assert "did you mean lapwing/scenes/hover.toml?" in said(Path("lapwing/scenes/hovr.toml"))
-    assert "no such file or directory" in said(tmp_path / "none.toml")
-    assert "is a folder" in said(tmp_path)
+def test_other_files_are_rejected_as_scenes(tmp_path):
+    assert "did you mean lapwing/scenes/hover.toml?" in error_text(Path("lapwing/scenes/hovr.toml"))
+    assert "no such file or directory" in error_text(tmp_path / "none.toml")
+    assert "is a folder" in error_text(tmp_path)
     (tmp_path / "damaged.toml").write_text("[run\nseed = 1\n")
-    assert "not valid TOML" in said(tmp_path / "damaged.toml")
+    assert "not valid TOML" in error_text(tmp_path / "damaged.toml")
     (tmp_path / "binary.toml").write_bytes(b"\xff\xfe")
-    assert "not valid TOML: not a UTF-8 text file" in said(tmp_path / "binary.toml")
+    assert "not valid TOML: not a UTF-8 text file" in error_text(tmp_path / "binary.toml")
     (tmp_path / "flight.mcap").write_bytes(b"\x89MCAP0\r\n\x01")
-    assert "is a log (MCAP); expected a scene file (TOML)" in said(tmp_path / "flight.mcap")
+    assert "is a log (MCAP); expected a scene file (TOML)" in error_text(tmp_path / "flight.mcap")

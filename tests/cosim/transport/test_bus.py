@@ -1,4 +1,4 @@
-"""Messages waiting on the bus use the memory of their bytes, not of the receive buffers."""
+"""Bus: memory of pending messages, deferred subscriptions, wake-up, and settings of the session."""
 
 import ast
 import os
@@ -19,30 +19,30 @@ KEY, MARK = "test-bus/_batch/plant", bytes(16)
 
 
 def anonymous():
-    """Memory [bytes] of this process that is of no file."""
+    """Return the anonymous memory [bytes] of this process."""
     return 1024 * int(re.search(r"^Anonymous:\s+(\d+)", Path("/proc/self/smaps_rollup").read_text(), re.MULTILINE)[1])
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="memory is told by Linux's /proc")
-def test_messages_that_wait_take_little_memory():
+@pytest.mark.skipif(sys.platform != "linux", reason="reads memory from Linux's /proc")
+def test_pending_messages_take_little_memory():
     (endpoint,) = loopback_endpoints(["a"]).values()
     with ZenohBus([endpoint]) as there, ZenohBus(connect=[endpoint], gid=MARK) as here:
         arrived, put = there.receive({KEY: MARK}), here.publisher(KEY)
-        while arrived.get(timeout=0.1) is None:  # until the subscription has come
+        while arrived.get(timeout=0.1) is None:  # until the subscription has arrived
             put(b"first", 0)
 
-        def wait_for(number):
-            """So many messages, each on its own, as they come from a run that flies."""
+        def send(number):
+            """Send `number` messages one by one, as in a run."""
             for _ in range(number):
                 put(bytes(300), 0)
                 time.sleep(0.0005)
             time.sleep(1.0)
 
-        wait_for(200)
+        send(200)
         while arrived.get(timeout=0.0):
             pass
         before = anonymous()
-        wait_for(MESSAGES)
+        send(MESSAGES)
         grown = anonymous() - before
         taken = sum(1 for _ in iter(lambda: arrived.get(timeout=0.0), None))
     assert taken == MESSAGES
@@ -60,7 +60,7 @@ def test_deferred_subscription_returns_messages_in_order_of_sending():
             put(b"%d" % number, number)
         payloads = []
         with ZenohBus(connect=[endpoint], gid=other) as stranger:
-            while not (there.rejected and len(payloads) == 5):  # a message is rejected when it is taken
+            while not (there.rejected and len(payloads) == 5):  # messages are rejected when they are read
                 stranger.publisher(KEY)(b"forged", 0)
                 payloads += [m[1] for m in iter(lambda: arrived.get(timeout=0.1), None) if m[1] != b"first"]
     assert payloads == [b"%d" % number for number in range(5)]
@@ -88,7 +88,7 @@ print(os.environ.get("ZENOH_RUNTIME"))
 
 @pytest.mark.skipif(sys.platform != "linux", reason="reads the names of threads from /proc, which only Linux has")
 def test_child_process_does_not_inherit_zenoh_runtime_setting():
-    """In a program with one runtime thread, a callback that sends several fragments waits for itself."""
+    """Another program with a single runtime thread could deadlock in a callback that sends several fragments."""
     (endpoint,) = loopback_endpoints(["a"]).values()
     environment = {key: value for key, value in os.environ.items() if key != "ZENOH_RUNTIME"}
     command = [sys.executable, "-c", SESSION, endpoint]

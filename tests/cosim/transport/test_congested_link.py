@@ -1,4 +1,4 @@
-"""Links to a process that reads nothing for a while: Zenoh closes them after a time, and messages are lost."""
+"""Links to a stalled reader: Zenoh closes them after some time and loses messages; Lapwing's links wait."""
 
 import json
 import os
@@ -14,8 +14,8 @@ from lapwing.cosim.processes.run_monitor import LONGEST
 from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.session_settings import CHILD_LINKS
 
-MESSAGES, SIZE = 100, 50_000  # much more than the buffers of a link hold
-PAUSE = 2.0  # [s] that the reader is stopped, perhaps while its link opens
+MESSAGES, SIZE = 100, 50_000  # much more than the buffers of a link
+PAUSE = 2.0  # [s] of the stopped reader, possibly while its link opens
 OPEN, LEASE = "transport/unicast/open_timeout", "transport/link/tx/lease"
 WAIT = "transport/link/tx/queue/congestion_control/block/wait_before_close"
 
@@ -32,7 +32,7 @@ with ZenohBus(connect=[sys.argv[1]], awaits=False, security=json.loads(sys.argv[
 
 
 def received(settings):
-    """Return the number of messages that a reader gets that is stopped while they are sent."""
+    """Return the number of messages received by a reader that is stopped while they are sent."""
     with private_endpoints(["writer"]) as endpoints, ZenohBus([endpoints["writer"]], security=settings) as bus:
         command = [sys.executable, "-c", READER, endpoints["writer"], json.dumps(settings)]
         reader = subprocess.Popen(command, stdout=subprocess.PIPE, text=True)
@@ -44,7 +44,7 @@ def received(settings):
         for i in range(MESSAGES):
             put(bytes(SIZE), i)
         resume.wait()
-        while reader.poll() is None:  # its link may be opened again
+        while reader.poll() is None:  # its link may reopen
             put(b"", MESSAGES)
             time.sleep(0.1)
         return int(reader.communicate()[0])

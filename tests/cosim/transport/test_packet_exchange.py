@@ -39,7 +39,7 @@ class Bus:
 
 
 class Counts:
-    """Gives, at each port that is due, the tick."""
+    """Python block that writes the tick to each due port."""
 
     name, inputs = "counts", ()
 
@@ -57,7 +57,7 @@ class Counts:
 
 
 class Takes(Counts):
-    """Notes what it takes."""
+    """Python block that notes its inputs."""
 
     name, outputs = "takes", ()
 

@@ -1,4 +1,4 @@
-"""The layout that programs of one's own read is that of the bundles."""
+"""The published packet layout equals the layout of step packets."""
 
 import pytest
 
@@ -13,7 +13,7 @@ from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
 
 
-def test_columns_are_named_in_order_of_row():
+def test_columns_have_order_of_row():
     like = MotorCommand((1.0, 2.0, 3.0, 4.0), True, (5.0, 6.0, 7.0, 8.0), (9.0, 10.0, 11.0))
     named = dict(zip(columns(like), pack_row(like), strict=True))
     assert named["motor_voltage.2"] == 3.0

@@ -1,4 +1,4 @@
-"""Bundles of several ticks: whatever the services and delays, the lock step comes to its end as with bundles of one."""
+"""Step packets of several ticks: lock step reaches the end of the run for all services and delays."""
 
 from hypothesis import example, given
 from hypothesis import strategies as st
@@ -20,7 +20,7 @@ NAMES = ("plant", "sensors", "autopilot", "trajectory", "another")
 
 
 def setup_of(links):
-    """Services that take one another's ports: (producer, consumer): delay [ticks]."""
+    """Return services with these connections: (producer, consumer): delay [ticks]."""
     services = {
         name: ServiceConfig(
             None, tuple(InputPort(p, d) for (p, c), d in links.items() if c == name and p != name), (Port(name, 0.0),)
@@ -31,13 +31,12 @@ def setup_of(links):
 
 
 def newest_needed(setup, producer, consumer, tick):
-    """The newest tick of the producer that the consumer takes at `tick`; -1: none."""
+    """Return the newest tick of the producer that the consumer reads at `tick`; negative: none."""
     return max(tick - i.delay for i in setup.services[consumer].inputs if i.port == producer)
 
 
 def end(setup):
-    """The ticks that each service has stepped when nobody can go on: as `lapwing.cosim.executors.lockstep` does,
-    one after another."""
+    """Return the ticks of each service when none can continue, in the order of `lapwing.cosim.executors.lockstep`."""
     stepped = dict.fromkeys(setup.services, 0)
     moved = True
     while moved and min(stepped.values()) <= LAST:
@@ -72,7 +71,7 @@ def test_packet_schedule_cannot_deadlock(links):
     try:
         assert setup.order
     except LockStepError:
-        return  # a loop without delay is refused
+        return  # algebraic loops are rejected
     assert min(end(setup).values()) > LAST
 
 
@@ -94,6 +93,6 @@ def test_packet_schedules_have_unique_keys():
 
 def test_battery_has_separate_packets():
     setup = resolve(load("delivery_mission"))
-    taken = packet_schedule(setup, "plant", "autopilot")
-    assert [port.name for port in taken.ports(setup.services["plant"].ports)] == ["battery"]
+    schedule = packet_schedule(setup, "plant", "autopilot")
+    assert [port.name for port in schedule.ports(setup.services["plant"].ports)] == ["battery"]
     assert packet_schedule(setup, "plant", "sensors") == EACH_TICK

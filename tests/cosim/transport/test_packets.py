@@ -1,4 +1,4 @@
-"""Bundles of rows and batches of messages: out and in again; what is no bundle or batch is refused."""
+"""Step packets and log packets: round trips, and rejection of invalid packets."""
 
 from typing import NamedTuple
 
@@ -15,14 +15,14 @@ from tests.cosim.small_graph import graph_of
 
 
 class Pair(NamedTuple):
-    """A port of two numbers."""
+    """Port of two numbers."""
 
     left: float
     right: float
 
 
 class Single(NamedTuple):
-    """A port of a number and a truth value."""
+    """Port of a number and a Boolean."""
 
     number: float
     good: bool
@@ -32,7 +32,7 @@ PORTS = (Port("pair", Pair(0.0, 0.0)), Port("slow", Single(0.0, False), 5), Port
 
 
 class User:
-    """Stands for a service that uses some of the ports."""
+    """Service that uses some of the ports."""
 
     name = "user"
     outputs = ()
@@ -41,7 +41,7 @@ class User:
         self.inputs = tuple(InputPort(name) for name in names)
 
     def bind(self, graph):
-        """Nothing to be prepared."""
+        """Do nothing."""
 
 
 def graph(*names):
@@ -49,7 +49,7 @@ def graph(*names):
 
 
 def filled(tick):
-    """A graph in which the ports that are due at `tick` have a value of that tick."""
+    """Return a diagram with values of the due ports at `tick`."""
     result = graph("pair", "slow", "slower")
     for port in PORTS:
         if tick % port.period == 0:
@@ -59,21 +59,21 @@ def filled(tick):
 
 @pytest.mark.parametrize(("tick", "numbers"), [(0, 6), (3, 2), (5, 4), (10, 6)])
 def test_step_packet_holds_due_rows_in_order(tick, numbers):
-    bundles, giver, taker = StepPacketCodec(PORTS), filled(tick), graph("slower", "pair", "slow")
-    payload = bundles.pack(giver, tick)
+    codec, producer, consumer = StepPacketCodec(PORTS), filled(tick), graph("slower", "pair", "slow")
+    payload = codec.pack(producer, tick)
     expected = [tick + 0.5, -float(tick), tick + 0.5, 1.0, tick + 0.5, -float(tick)][:numbers]
     assert np.frombuffer(payload, "<f8").tolist() == expected
-    bundles.unpack(payload, taker, tick)
+    codec.unpack(payload, consumer, tick)
     for port in PORTS:
         if tick % port.period == 0:
-            assert taker.latest(port.name, tick) == giver.latest(port.name, tick)
+            assert consumer.latest(port.name, tick) == producer.latest(port.name, tick)
 
 
 def test_diagram_stores_ports_in_use_only():
-    taker = graph("slow")
-    StepPacketCodec(PORTS).unpack(StepPacketCodec(PORTS).pack(filled(10), 10), taker, 10)
-    assert taker.latest("slow", 10) == Single(10.5, True)
-    assert not taker.has("pair")
+    consumer = graph("slow")
+    StepPacketCodec(PORTS).unpack(StepPacketCodec(PORTS).pack(filled(10), 10), consumer, 10)
+    assert consumer.latest("slow", 10) == Single(10.5, True)
+    assert not consumer.has("pair")
 
 
 def test_service_without_due_port_has_no_packet():
@@ -83,7 +83,7 @@ def test_service_without_due_port_has_no_packet():
 
 
 def run_of(ticks):
-    """A graph whose ports have values at each of the ticks [0, ticks) at which they are due."""
+    """Return a diagram with values of the due ports at each tick in [0, ticks)."""
     result = graph("pair", "slow", "slower")
     for port in PORTS:
         for tick in range(0, ticks, port.period):
@@ -93,17 +93,17 @@ def run_of(ticks):
 
 @pytest.mark.parametrize("ticks", [2, 3, 4, 7, 12])
 def test_packet_of_several_ticks_equals_single_packets(ticks):
-    giver, one_by_one, at_once = run_of(15), graph("pair", "slow"), graph("pair", "slow")
+    producer, one_by_one, at_once = run_of(15), graph("pair", "slow"), graph("pair", "slow")
     for ports in (PORTS, PORTS[1:]):
         single, several = StepPacketCodec(ports), StepPacketCodec(ports, ticks)
         for first in range(0, 15 - ticks, ticks):
             each = [tick for tick in range(first, first + ticks) if single.due(tick)]
             assert several.due(first) == bool(each)
             for tick in each:
-                single.unpack(single.pack(giver, tick), one_by_one, tick)
+                single.unpack(single.pack(producer, tick), one_by_one, tick)
             if each:
-                payload = several.pack(giver, first)
-                assert len(payload) == sum(len(single.pack(giver, tick)) for tick in each)
+                payload = several.pack(producer, first)
+                assert len(payload) == sum(len(single.pack(producer, tick)) for tick in each)
                 several.unpack(payload, at_once, first)
         for port in ports[:-1]:
             for tick in range(0, first + ticks, port.period):
@@ -128,7 +128,7 @@ def page(topic, first, n, size, seed=0):
 
 
 def records(n):
-    """A page whose payloads are records, as `Wire` makes them."""
+    """Return a batch whose payloads are records, as `TopicEncoder` makes them."""
     dtype = np.dtype({"names": ["x", "all"], "formats": ["<f8", "V12"], "offsets": [4, 0], "itemsize": 12})
     result = np.zeros(n, dtype)
     result["x"] = np.arange(n)

@@ -15,12 +15,12 @@ KEY, MARK, OTHER, WAKER = "test-inbox/_step/plant", bytes(16), b"o" * 16, b"w" *
 
 @pytest.fixture
 def joined():
-    """A bus with an inbox, another that publishes, and the inbox."""
+    """Yield a bus with an inbox, a publishing bus, and the inbox."""
     (endpoint,) = loopback_endpoints(["a"]).values()
     with ZenohBus([endpoint]) as there, ZenohBus(connect=[endpoint], gid=MARK) as here:
         inbox = there.inbox(KEY, MARK)
         put = here.publisher(KEY)
-        while inbox.get(0.1) is None:  # until the subscription has come
+        while inbox.get(0.1) is None:  # until the subscription has arrived
             put(b"first", 0)
         while inbox.get(0.2):
             pass
@@ -44,7 +44,7 @@ def test_empty_inbox_waits_for_timeout(joined):
     assert inbox.get(5.0) == (7, b"late")
 
 
-def test_others_are_refused_and_counted(joined):
+def test_messages_of_others_are_rejected_and_counted(joined):
     there, here, inbox = joined
     before = there.rejected
     zenoh = here._session
@@ -63,7 +63,7 @@ def test_full_ring_drops_oldest_without_blocking(joined):
     for i in range(INBOX + 500):
         put(bytes(8), i)
     put(b"last", 0)
-    time.sleep(1.0)  # all have come
+    time.sleep(1.0)  # for all to arrive
     arrived = []
     while result := inbox.get(0.2):
         arrived.append(result)
@@ -73,13 +73,13 @@ def test_full_ring_drops_oldest_without_blocking(joined):
 
 
 def inbox_of(messages, sender=MARK):
-    """One whose bus has these messages, and wakes it for ever after."""
+    """Return an inbox whose bus has these messages and then only wakes it, and its counter of rejections."""
     refused = count()
     samples = iter(messages)
     return Inbox(lambda: next(samples, (0, WAKER, b"")), lambda m: m, sender, WAKER, lambda: next(refused)), refused
 
 
-def test_waker_that_comes_too_late_is_passed_over():
+def test_late_wake_up_is_ignored():
     inbox, _ = inbox_of([(0, WAKER, b""), (0, WAKER, b""), (3, MARK, b"it")])
     assert inbox.get(5.0) == (3, b"it")
     assert inbox.deadline == float("inf")

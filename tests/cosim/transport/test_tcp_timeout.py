@@ -1,4 +1,4 @@
-"""Connections to hosts that confirm nothing any more are ended by the system."""
+"""The system closes connections to hosts that no longer acknowledge data."""
 
 import os
 import socket

@@ -1,4 +1,4 @@
-"""Kernels hand tuples to one another whole; what numba does otherwise for special functions still works."""
+"""Kernels pass tuples whole; numba's default convention for special functions still works."""
 
 import numpy as np
 import pytest
@@ -17,7 +17,7 @@ def through_pair(flag, inside, one, two):
     return pair(flag, inside, one), pair(flag, inside, one, two)
 
 
-def test_booleans_nested_tuples_and_stars_arrive():
+def test_booleans_nested_tuples_and_star_arguments_are_passed():
     inside, one, two = (1.0, (2, True)), (3.0,), (4.0,)
     swapped = (False, ((2, True), 1.0))
     assert through_pair(True, inside, one, two) == ((*swapped, (one,)), (*swapped, (one, two)))
@@ -29,12 +29,12 @@ def indexed(table, i):
 
 
 @kernel
-def with_a_table_of_one(table):
+def with_single_table(table):
     return map_index(indexed, (0.0, 0.0), table)
 
 
-def test_argument_values_may_have_equal_length():
-    assert with_a_table_of_one(((1.0, 2.0), (3.0, 4.0))) == ((1.0, 2.0), (3.0, 4.0))
+def test_tuple_arguments_may_have_equal_length():
+    assert with_single_table(((1.0, 2.0), (3.0, 4.0))) == ((1.0, 2.0), (3.0, 4.0))
 
 
 @kernel
@@ -116,8 +116,8 @@ def defined(library):
     return {f.name for f in library._get_module_for_linking().functions if not f.is_declaration}
 
 
-def test_function_apart_is_linked_into_outermost_kernel_only():
-    twice_both._cache.disable()  # what comes from the disk has no inner kernels
+def test_noinline_function_is_linked_into_outermost_kernel_only():
+    twice_both._cache.disable()  # kernels from the disk have no inner kernels
     assert twice_both((2.0, 3.0)) == 2.0 * (8.0 + 27.0 + 8.0)
     (inner,) = (result.library for result in both.overloads.values())
     assert len(inner._noinline) == 2
@@ -138,7 +138,7 @@ def entries(table, i):
     return entry(table, 0, True), entry(table, 1, False), entry(table, -1, doubled=True), entry(table, i, i > 0)
 
 
-def test_constants_make_no_further_versions():
-    entries._cache.disable()  # what comes from the disk has no inner kernels
+def test_constant_arguments_add_no_versions():
+    entries._cache.disable()  # kernels from the disk have no inner kernels
     assert entries((1.0, 2.0, 3.0), 1) == (2.0, 2.0, 6.0, 4.0)
     assert len(entry.overloads) == 1

@@ -1,4 +1,4 @@
-"""Kernels of the elementary functions by name."""
+"""Kernels of the elementary functions, by name."""
 
 from lapwing.kernels.math import exponential, inverse_trigonometric, logarithm, roots, trigonometric
 

@@ -1,4 +1,4 @@
-"""Symmetries and identities of the elementary functions, and the same bits in compiled code and in plain Python."""
+"""Symmetries and identities of the elementary functions, bit for bit in compiled code and plain Python."""
 
 import ast
 import inspect
@@ -85,7 +85,7 @@ def test_machine_code_has_no_fma_and_no_library_call(name):
     assert not {symbol for symbol in called if not symbol.startswith(("_ZN", "Py", "_Py", "NRT_", "numba_"))}
 
 
-def test_length_of_any_number_of_coordinates():
+def test_length_accepts_any_number_of_coordinates():
     assert functions.hypot() == 0.0
     assert functions.hypot(-3.0) == 3.0
     assert functions.hypot(2.0, 3.0, 6.0) == 7.0
@@ -106,7 +106,7 @@ def test_functions_called_in_kernels_are_kernels():
     assert length(1.5, 0.5) == math.sqrt(2.5 * 2.5 + functions.sin(0.5) * functions.sin(0.5))
 
 
-def test_tables_are_those_that_script_computes():
+def test_tables_equal_output_of_script():
     assert coefficients.TARGET.read_text() == coefficients.text()
 
 

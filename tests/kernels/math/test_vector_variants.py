@@ -1,4 +1,4 @@
-"""Loops over elementary functions are vectorised, with the bits of the functions."""
+"""Loops over elementary functions are vectorised and equal the functions bit for bit."""
 
 import math
 import re
@@ -50,18 +50,18 @@ def _arguments(name):
 
 
 @pytest.mark.parametrize("name", sorted(KERNELS))
-def test_loop_has_bits_of_function(name):
+def test_loop_equals_function_bit_for_bit(name):
     x, *y = _arguments(name)
     result, second = np.empty_like(x), np.array(y[0]) if y else np.empty_like(x)
     _loop(name)(result, x, second)
-    wanted = [
+    expected = [
         getattr(functions, name)(*row) for row in zip(x.tolist(), *(column.tolist() for column in y), strict=True)
     ]
     if name == "sincos":
-        wanted, cosines = zip(*wanted, strict=True)
+        expected, cosines = zip(*expected, strict=True)
         np.testing.assert_array_equal(second, cosines)
-    np.testing.assert_array_equal(result, wanted)
-    assert np.array_equal(np.signbit(result), np.signbit(wanted)) or np.isnan(wanted).any()
+    np.testing.assert_array_equal(result, expected)
+    assert np.array_equal(np.signbit(result), np.signbit(expected)) or np.isnan(expected).any()
 
 
 @pytest.mark.skipif(
