@@ -1,4 +1,4 @@
-"""Rotors with axes of their own: by hand, by an independent sum over rotors, and seen from a turned body frame."""
+"""Tilted rotors against hand calculations, an independent sum over rotors, and a rotated body frame."""
 
 from dataclasses import dataclass
 
@@ -42,7 +42,7 @@ def airframe(drone, axes, positions=None):
 
 
 def flown(frame, tables, turn=(0.2, -0.3, 0.5), velocity=(4.0, -2.0, 1.5), omega=RATES):
-    """The loads on a vehicle with rotors at SPEED under VOLTAGE; `turn` is the rotation vector body to world."""
+    """Return the loads on a vehicle with rotors at SPEED under VOLTAGE; `turn` is the rotation vector body to world."""
     p = multirotor.parameters(frame, effects.from_scene(tables, frame))
     R = Rotation.from_rotvec(turn)
     attitude = Quaternion(*map(float, R.as_quat(scalar_first=True)))
@@ -83,7 +83,7 @@ def test_static_thrust_and_moments_by_hand(drone):
     ids=lambda tables: " ".join(tables),
 )
 def test_vehicle_in_turned_body_frame_flies_same(drone, tables):
-    """All axes tilted alike, and the hubs turned with them, are the plain vehicle in other coordinates."""
+    """Tilting all axes and hubs alike describes the plain vehicle in other coordinates."""
     hubs = [(x, y, 0.1) for x, y, _ in drone.rotors.position]
     Q = Rotation.from_rotvec([0.3, -0.4, 0.2])  # of the vehicle in its body frame
     turn = Rotation.from_rotvec([0.2, -0.3, 0.5])
@@ -97,7 +97,7 @@ def test_vehicle_in_turned_body_frame_flies_same(drone, tables):
 
 
 def test_gyroscopic_torque_conserves_angular_momentum(drone):
-    """-dL/dt of L = -J sum s w a, carried along by a body that turns: by differences of L in the world."""
+    """The torque is -dL/dt of L = -J sum s w a in a rotating body; the reference uses differences of L in the world."""
     frame = airframe(drone, AXES)
     with_it = flown(frame, {"rotor_thrust": {}, "gyroscopic_torque": {}})
     without = flown(frame, {"rotor_thrust": {}})
@@ -113,7 +113,7 @@ def test_gyroscopic_torque_conserves_angular_momentum(drone):
     assert with_it.torque - without.torque == pytest.approx(-rate, rel=1e-6)
 
 
-def test_axes_along_z_are_none(drone):
+def test_axes_along_z_need_no_tilt(drone):
     assert airframe(drone, [(0.0, 0.0, 2.0)] * 4).rotors.tilted_axis == ()
 
 
@@ -126,7 +126,7 @@ def test_axes_along_z_are_none(drone):
         ([(1, 0, 0)] + [(0, 0, 1)] * 3, "rotors.axis.0: expected a direction that points up"),
     ],
 )
-def test_refused(drone, axis, message):
+def test_invalid_axes_are_rejected(drone, axis, message):
     with pytest.raises(ValidationError) as caught:
         Airframe.model_validate(
             drone.model_dump(exclude_none=True) | {"rotors": drone.rotors.model_dump() | {"axis": axis}}

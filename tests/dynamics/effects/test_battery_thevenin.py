@@ -1,4 +1,4 @@
-"""Against the closed forms of a step of current, the paper's time constants, and a balance of heat."""
+"""Thevenin battery against the closed form of a current step, the paper's time constants and a heat balance."""
 
 import math
 
@@ -20,7 +20,7 @@ def make(drone, around=None, **table):
 
 
 def flown(e, memory, situation, rotors, current, seconds, interval=0.1):
-    """Memory after drawing a constant current [A] from the pack."""
+    """Return the discrete state after the pack has supplied a constant current [A]."""
     for tick in range(round(seconds / interval)):
         requested = rotors(current=0.25 * current, voltage=memory[1])
         memory = discharge.py_func(e, memory, situation(), requested, (0, 0), tick, interval)
@@ -40,7 +40,7 @@ def test_voltage_after_current_step_is_two_exponentials(drone, situation, rotors
     assert rest - rested[1] == pytest.approx(OHMIC * 40.0 * left, rel=1e-6)
 
 
-def test_interval_does_not_matter(drone, situation, rotors):
+def test_result_is_independent_of_interval(drone, situation, rotors):
     e = make(drone, initial_charge=0.6, **COLD)
     fine, coarse = (flown(e, e.initial_discrete_state(), situation, rotors, 40.0, 20.0, h) for h in (0.05, 1.0))
     assert coarse[:2] == pytest.approx(fine[:2], rel=1e-9)
@@ -101,7 +101,7 @@ def test_two_batteries_are_rejected(drone):
 
 
 def delivered(drone, situation, rotors, rate, **table):
-    """Charge [A h] at a current of `rate` C until the controllers stop, of 10 A h."""
+    """Return the charge [A h] of 10 A h that the pack delivers at `rate` C until the controllers stop."""
     e = make(drone, cutoff_voltage=3.0, **COLD, **table)
     memory, ticks = e.initial_discrete_state(), 0
     while memory[6] > 0.0 and memory[0] > 0.0:
@@ -114,7 +114,7 @@ def delivered(drone, situation, rotors, rate, **table):
 
 @pytest.mark.parametrize("exponent", [1.05, 1.2])
 def test_exponent_gives_peukerts_law(drone, situation, rotors, exponent):
-    """C = C_1 I^(1 - n) of the charge that the battery delivers without the law."""
+    """The delivered charge is C = C_1 I^(1 - n) times the charge without the law."""
     for rate in (2.0, 10.0):
         plain = delivered(drone, situation, rotors, rate)
         expected = plain * rate ** (1.0 - exponent)
@@ -122,13 +122,13 @@ def test_exponent_gives_peukerts_law(drone, situation, rotors, exponent):
 
 
 def test_branches_alone_are_near_peukerts_law(drone, situation, rotors):
-    """Against n = 1.05, usual for lithium polymer: the differences are those of theory.md; 20 C is cut off early."""
+    """Reference: n = 1.05, usual for lithium polymer. theory.md lists the differences; 20 C is cut off early."""
     base = delivered(drone, situation, rotors, 1.0)
     differences = [delivered(drone, situation, rotors, r) / (base * r**-0.05) - 1.0 for r in (2.0, 5.0, 10.0, 20.0)]
     assert differences == pytest.approx([0.033, 0.074, 0.093, -0.215], abs=0.01)
 
 
-def test_currents_below_one_c_take_their_own_charge(drone, situation, rotors):
+def test_exponent_has_no_effect_below_one_c(drone, situation, rotors):
     table = {"initial_charge": 0.6, **COLD}
     plain, law = make(drone, **table), make(drone, peukert_exponent=1.2, **table)
     states = [flown(e, e.initial_discrete_state(), situation, rotors, 9.0, 5.0) for e in (plain, law)]

@@ -27,7 +27,7 @@ def hat(v):
 
 
 def in_hat(v, f0, f1, f2):
-    """f0 I + f1 hat + f2 hat^2 with scalar functions of the angle, 50 digits."""
+    """Return f0 I + f1 hat + f2 hat^2 with scalar functions of the angle, 50 digits."""
     a = mpmath.sqrt(mpmath.fsum(mpmath.mpf(c) ** 2 for c in v))
     h = hat(v)
     return f0(a) * mpmath.eye(3) + f1(a) * h + f2(a) * h * h

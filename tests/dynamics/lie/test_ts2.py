@@ -1,4 +1,4 @@
-"""The action of SE(3) on TS^2: a group action, with the stated generator, that keeps both constraints."""
+"""Action of SE(3) on TS^2: group action, generator, and both constraints."""
 
 import numpy as np
 import pytest

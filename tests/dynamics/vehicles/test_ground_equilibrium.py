@@ -1,4 +1,4 @@
-"""Rest on level ground, on a slope, between bumps."""
+"""Resting pose on level ground, on a slope and between bumps."""
 
 import math
 
@@ -40,7 +40,7 @@ UNEVEN = [(0.2, 0.2, -0.30), (-0.2, 0.2, -0.35), (-0.2, -0.2, -0.35), (0.25, -0.
 
 
 @pytest.mark.parametrize("slope", [(0.0, 0.0), (0.1, 0.0), (-0.2, 0.3)])
-def test_of_uneven_feet_three_around_centre_of_mass_touch(slope):
+def test_three_uneven_feet_around_centre_of_mass_touch(slope):
     R, heights = clearances(UNEVEN, relief(slope=slope))
     assert heights.min() > -1e-12
     assert np.sort(heights)[2] < 1e-12

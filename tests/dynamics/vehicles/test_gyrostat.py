@@ -1,4 +1,4 @@
-"""Gyrostat: the published equations component by component, its invariants, its four cases and its attitude control."""
+"""Gyrostat against the published equations; invariants, four published cases and attitude control."""
 
 import math
 
@@ -21,7 +21,7 @@ START = RigidBody(NO_ROTATION, (0.1, 0.1, 0.1))
 
 
 def published(t, o, p):
-    """The three scalar equations, time in minutes."""
+    """Return the rates of the three scalar equations, time in minutes."""
     a, b, c = p.inertia
     h1, h2, h3 = p.rotor_momentum
     (x, y, z), f, w = o, p.forcing_amplitude, p.forcing_frequency
@@ -46,7 +46,7 @@ def published(t, o, p):
 @pytest.mark.parametrize(
     "p", [GE_LIN, CHAOTIC, BLOCKED, GE_LIN._replace(desired_rate=0.7, inertia=(400.0, 520.0, 900.0))]
 )
-def test_rate_is_published_one(p):
+def test_rate_equals_published_equations(p):
     for t, o in ((0.0, (0.1, 0.1, 0.1)), (2.3, (-0.4, 1.2, 0.6))):
         actual = rate(p, t, RigidBody(NO_ROTATION, o))
         assert actual.omega_body == pytest.approx(published(t, o, p), rel=1e-14)
@@ -60,7 +60,7 @@ def world_momentum(states, h=ZERO):
     return momentum + w * t + np.cross(u, t)
 
 
-def test_blocked_rotors_are_free_body():
+def test_blocked_rotors_equal_free_body():
     _, one = simulate(get("rkmk4"), BLOCKED, START, 0.01, 1000, every=100)
     _, two = simulate(get("rkmk4"), FreeBodyParameters(INERTIA), START, 0.01, 1000, every=100)
     assert (one == two).all()

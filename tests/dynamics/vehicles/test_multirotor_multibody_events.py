@@ -1,4 +1,4 @@
-"""A propeller that locks, turns free or is torn off in flight: nothing from outside acts, so momenta are kept."""
+"""A propeller locks, turns freely or is torn off in flight without external loads: momenta are constant."""
 
 from pathlib import Path
 
@@ -68,7 +68,7 @@ def bodies(x):
 
 
 def spin(p, b):
-    """Angular momentum of each body about its own centre of mass, in the world, shape (5, 3)."""
+    """Return the angular momentum of each body about its centre of mass, in the world, shape (5, 3)."""
     d = p.layout.bodies.drone
     moments = np.array([d.inertia, *d.propeller_inertia])
     turned = [np.array(rotation_matrix(q.attitude)).reshape(3, 3) for q in b]
@@ -76,7 +76,7 @@ def spin(p, b):
 
 
 def momenta(p, x):
-    """(linear, angular about the origin) of the five bodies, shape (6,)."""
+    """Return (linear, angular about the origin) momenta of the five bodies, shape (6,)."""
     d, b = p.layout.bodies.drone, bodies(x)
     masses = np.array([d.mass, *d.propeller_mass])
     linear = masses[:, None] * [q.velocity_world for q in b]
@@ -114,7 +114,7 @@ def test_momentum_is_kept_across_event(coordinates, drive, becomes):
 
 
 def test_locked_propeller_transfers_spin_to_chassis():
-    """The naive way, which just stops it, loses the spin."""
+    """The baseline, which only stops the propeller, loses the spin."""
     _, p, _, state = before("se3", "torque")
     after = multirotor_multibody.with_propeller_failure(p, 1, "locked")
     speed = seen(p, state.motion).rotor_speed[1]
@@ -133,12 +133,12 @@ def test_locked_propeller_transfers_spin_to_chassis():
 
 @pytest.mark.parametrize("drive", ["torque", "speed"])
 def test_free_propeller_keeps_its_spin_without_air(drive):
-    """The naive way, a motor without voltage, brakes it."""
+    """The baseline, a motor without voltage, brakes the propeller."""
     _, p, _, state = before("se3", drive)
     after = multirotor_multibody.with_propeller_failure(p, 1, "free")
     end = flown(after, state, 20, 10)
     axial = [bodies(x)[2].omega_body[2] for x in (state.motion, end.motion)]
-    # uneven blades trade a trace of it with the body rates
+    # uneven blades exchange a little of it with the body rates
     assert axial[1] == pytest.approx(axial[0], rel=1e-4)
     assert seen(after, end.motion).rotor_speed[3] > seen(after, state.motion).rotor_speed[3] + 10.0
     assert hinges(after, end.motion, VOLTS)[2][1][2] == pytest.approx(0.0, abs=1e-12)
@@ -147,9 +147,9 @@ def test_free_propeller_keeps_its_spin_without_air(drive):
 
 
 @pytest.mark.parametrize("coordinates", FORMS)
-def test_of_torn_off_propeller_constraint_rows_vanish(coordinates):
-    """It flies straight and keeps its own spin; nothing acts at its hinge; the others are still held. The naive way,
-    a propeller that gives no thrust any more, stays where it is."""
+def test_torn_off_propeller_has_no_constraint_rows(coordinates):
+    """The propeller flies straight and keeps its spin without a hinge force; the others are held. In the baseline,
+    a propeller without thrust, it stays in its place."""
     form, p, _, state = before(coordinates, "speed")
     after = form.with_propeller_failure(p, 1, "torn_off")
     if coordinates == "euler":
@@ -215,7 +215,7 @@ def bodies_of(x, y):
 
 
 def by_dop853(p, state, duration):
-    """The bodies after `duration` by SciPy, from the tangent; quaternions as plain numbers, q' = q (0, omega)/2."""
+    """Return the bodies after `duration`, by SciPy from the tangent, with quaternions q' = q (0, omega)/2."""
 
     def rate(_, y):
         x = bodies_of(state.motion, y)
@@ -251,8 +251,8 @@ def test_failures_between_ticks_equal_split_reference(becomes):
     assert np.abs(error).max() < 1e-9
 
 
-def test_failure_at_tick_is_that_of_tick():
-    """Bit for bit: the plant without failures that starts from the tick's state."""
+def test_failure_at_tick_equals_failure_between_runs():
+    """The result is bit-for-bit that of a plant without failures that starts at the tick."""
     p = multirotor_multibody.parameters(DRONE, EFFECTS, "torque")
     state = flown(p, multirotor_multibody.initial_state(p, (0.0, 0.0, 0.0), ATTITUDE, SPEED, VELOCITY, OMEGA), 3)
     after = multirotor_multibody.with_propeller_failure(p, 1, "locked")

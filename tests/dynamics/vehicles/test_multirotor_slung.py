@@ -1,4 +1,4 @@
-"""The slung load against closed forms: pendulum, conservation, free fall on a slack cable, the pull at its end."""
+"""Slung load against closed forms: pendulum, conservation, free fall on a slack cable, force of a taut cable."""
 
 import math
 
@@ -42,7 +42,7 @@ def begin(p, load, load_velocity, omega=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0
 
 
 def invariants(x):
-    """(energy [J], momentum [N s], angular momentum about the common centre of mass [N m s])."""
+    """Return (energy [J], momentum [N s], angular momentum about the common centre of mass [N m s])."""
     v, m, inertia = x.vehicle, QUAD.mass.total, np.array(QUAD.mass.inertia)
     position, load = np.array(v.position_world), np.array(x.load_position)
     velocity, load_velocity, omega = np.array(v.velocity_world), np.array(x.load_velocity), np.array(v.omega_body)
@@ -60,7 +60,7 @@ def invariants(x):
 
 
 def test_load_on_fixed_hook_is_pendulum():
-    """Period 4 sqrt(L / g) K(sin^2(a / 2)), L with the stretch under the load."""
+    """The period is 4 sqrt(L / g) K(sin^2(a / 2)), L including the stretch under the load."""
     sling = SLING._replace(stiffness=2e4)
 
     def slope(_, s):
@@ -100,7 +100,7 @@ def test_on_slack_cable_both_fall_freely():
 
 
 def test_taut_cable_force_is_bounded_by_stiffness():
-    """In free fall and without damping: speed apart times sqrt(stiffness times reduced mass)."""
+    """The bound in free fall without damping is the separation speed times sqrt(stiffness times reduced mass)."""
     sling = SLING._replace(hook_body=(0.0, 0.0, 0.0))
     p, speed = vehicle(sling), 1.5
     x, most = begin(p, (0.0, 0.0, 98.2), (0.0, 0.0, -speed)), 0.0
@@ -110,7 +110,7 @@ def test_taut_cable_force_is_bounded_by_stiffness():
     reduced = 1.0 / (1.0 / sling.load_mass + 1.0 / QUAD.mass.total)
     assert most == pytest.approx(speed * math.sqrt(sling.stiffness * reduced), rel=2e-3)
     apart = x.load_velocity[2] - x.vehicle.velocity_world[2]
-    assert apart == pytest.approx(speed, rel=2e-3)  # thrown back as fast: nothing is lost
+    assert apart == pytest.approx(speed, rel=2e-3)  # rebounds at the same speed: no loss
 
 
 def test_damped_cable_pulls_and_never_pushes():
@@ -154,7 +154,7 @@ def test_autopilot_lifts_and_carries_load_at_height():
 
 @pytest.mark.parametrize("h", [4e-3, 1e-3])
 def test_load_rebounds_from_taut_cable_as_damped_spring(h):
-    """In free fall. Any step is as accurate as the tolerance."""
+    """In free fall every step is as accurate as the tolerance."""
     ratio, speed, slack = 0.1, 1.5, 0.02
     reduced = 1.0 / (1.0 / SLING.load_mass + 1.0 / QUAD.mass.total)
     w = math.sqrt(SLING.stiffness / reduced)
