@@ -1,4 +1,4 @@
-"""Vehicles stepped side by side: the bits of one alone, resets, parameters of each, and commands of body rates."""
+"""Batches of vehicles: bit-for-bit equality with single vehicles, resets, parameters per member, body rates."""
 
 import re
 
@@ -35,7 +35,7 @@ def batch():
 
 
 def alone(k, volts, ticks, start=None):
-    """The numbers of the motion of member k after so many ticks, stepped by itself."""
+    """Return the motion of member k after `ticks` ticks, simulated alone."""
     from lapwing.studies.campaign.plan import plan
 
     values = plan(MISSION, (), N, 5, VARY).overrides_of(k)
@@ -47,7 +47,7 @@ def alone(k, volts, ticks, start=None):
 
 
 @pytest.mark.long
-def test_members_are_stepped_side_by_side_in_vector_registers(batch):
+def test_members_are_stepped_in_vector_registers(batch):
     batch.reset()
     batch.step(motor_voltages=np.full((N, 4), 31.0))
     for compiled in kernels.advance.overloads.values():
@@ -58,7 +58,7 @@ def rows(state):
     return np.column_stack(state[1:6])
 
 
-def test_every_member_has_bits_of_one_vehicle_alone(batch):
+def test_every_member_is_bit_for_bit_single_vehicle(batch):
     batch.reset()
     volts = np.linspace(31.0, 35.0, 4 * N).reshape(N, 4)  # some stay on the ground, some take off
     end = batch.step(motor_voltages=volts, ticks=125)
@@ -69,8 +69,8 @@ def test_every_member_has_bits_of_one_vehicle_alone(batch):
 
 
 @pytest.mark.long
-def test_rotors_at_limit_of_axial_inflow_have_bits_of_one_alone():
-    """Two members of three meet the limit, whose steps are under error control."""
+def test_rotors_at_limit_of_axial_inflow_are_bit_for_bit_single_vehicle():
+    """Two of three members reach the limit, whose steps have error control."""
     batch, ticks, volts = lapwing.BatchSimulator("hexacopter_tilted", 3), 25, (4.0, 5.0, 3.0, 6.0, 4.5, 5.5)
     start = {"position_world": (0.0, 0.0, 50.0), "rotor_speed": np.full((3, 6), 400.0)}
     climb = [0.0, 6.0, -6.0]
@@ -89,8 +89,8 @@ def test_rotors_at_limit_of_axial_inflow_have_bits_of_one_alone():
 
 @pytest.mark.long
 @pytest.mark.parametrize("effect", ["dc_motor={}", "dc_motor={inductance=5e-5}", "dynamic_inflow={}"])
-def test_limits_of_motors_and_flow_have_bits_of_one_alone(effect):
-    """Rotors of two members of three reach a limit, whose steps are under error control."""
+def test_limits_of_motors_and_flow_are_bit_for_bit_single_vehicle(effect):
+    """Rotors of two of three members reach a limit, whose steps have error control."""
     overrides, ticks, volts = [f"effects.{effect}"], 25, (28.0, 31.0, 30.0, 33.0)
     batch = lapwing.BatchSimulator("hover", 3, overrides=overrides)
     speeds, climb = [310.0, 335.0, 150.0], [0.0, 6.0, -6.0]
@@ -133,14 +133,14 @@ def test_body_rates_are_followed_and_thrust_holds_weight():
     assert abs(end.velocity_world[3, 2]) < 0.5
 
 
-def test_body_rate_control_is_that_of_voltages_computed_in_numpy():
-    """The controller in numpy: torque, allocation by least squares, inverse of thrust = k speed^2, speed = u KV."""
+def test_body_rate_control_equals_voltages_computed_in_numpy():
+    """The reference in numpy: torque, allocation by least squares, inverse of thrust = k speed^2, speed = u KV."""
     one, other = (lapwing.BatchSimulator("hover", 3) for _ in range(2))
     for batch in (one, other):
         batch.reset(position_world=(0.0, 0.0, 50.0), rotor_speed=one.hover_speed, omega_body=(0.4, -0.3, 0.2))
     a = one._nominal_airframe
     inertia, x, y, z = np.array(a.inertia_body), a.rotor_x, a.rotor_y, np.array(a.reaction_sign) * a.torque_per_thrust
-    effect = np.array([np.ones(4), y, -np.array(x), z])  # of a rotor's thrust on thrust and torques
+    effect = np.array([np.ones(4), y, -np.array(x), z])  # effect of a rotor's thrust on thrust and torques
     thrust, rates = (
         one.weight * np.array([0.9, 1.0, 1.1]),
         np.array([[0.5, 0.0, 0.1], [0.0, 0.5, 0.0], [1.0, 1.0, 0.0]]),
@@ -220,8 +220,8 @@ def test_member_with_non_finite_number_is_marked():
 
 @pytest.mark.long
 @pytest.mark.parametrize("ground", ["slope", "bumps", "steps", "box and cylinder", "grid", "rotor table"])
-def test_members_over_any_terrain_have_bits_of_one_alone(ground):
-    """Drops onto the terrain, each at its own place, so that some land on an edge or beside it."""
+def test_members_over_any_terrain_are_bit_for_bit_single_vehicle(ground):
+    """The members drop onto different places, some on an edge or beside it."""
     overrides = {
         "slope": HILL,
         "bumps": {"environment.terrain.bump_height": 0.05, "environment.terrain.bump_length": 0.7},

@@ -89,7 +89,7 @@ def test_run_that_fails_early_ignores_older_log(lapwing, monkeypatch):
 @pytest.mark.long
 @pytest.mark.parametrize("scene", ["delivery_mission", "cooperative_load"])
 def test_end_of_run_reads_all_topics_that_it_shows(tmp_path, scene):
-    """Page, metrics and events need only some topics of a log with every sensor."""
+    """Page, metrics and events need only some topics of a log with all sensors."""
     log = package.fly(package.load_scene(scene, {"run.duration": 2.0})).save(tmp_path / "a.mcap")
     (part,), whole = FlightData.read_all(log, SHOWN), FlightData.read(log)
     assert set(part.topics) < set(whole.topics)

@@ -1,4 +1,4 @@
-"""A scene of several vehicles from the command line: flown in both modes, told, reported, flown again."""
+"""Scene of several vehicles from the command line: both modes, summary, report, resimulation."""
 
 import json
 import subprocess
@@ -55,7 +55,7 @@ def test_report_shows_all_paths(flown):
     assert "quad_x" in page_text(page)
 
 
-def test_info_verify_and_refly_take_its_log(flown):
+def test_info_verify_and_resimulate_accept_log_of_fleet(flown):
     folder, _, figures = flown
     log = folder / "a.mcap"
     reported = command("info", log)

@@ -1,4 +1,4 @@
-"""Ctrl-C while the command still imports: one line and exit code 130, from its first statement on."""
+"""Ctrl-C during the imports of the command: one line and exit code 130, from its first statement on."""
 
 import signal
 import subprocess
@@ -23,7 +23,7 @@ main()
 
 
 def struck(module, number, output=subprocess.PIPE):
-    """The command, which gets a signal as it is about to import `module`."""
+    """Run the command, which receives a signal just before it imports `module`."""
     code = textwrap.dedent(STRIKE).replace("MODULE", module).replace("NUMBER", number.name)
     return subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=output, text=True, check=False)
 
@@ -31,12 +31,12 @@ def struck(module, number, output=subprocess.PIPE):
 @pytest.mark.parametrize(
     "module", ["lapwing.cosim.processes.interrupt", "lapwing.cli.main", "typer", "lapwing.cli.study_commands"]
 )
-def test_ctrl_c_at_import(module):
+def test_ctrl_c_at_import_has_line_and_exit_code(module):
     done = struck(module, signal.SIGINT)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "lapwing: ended by SIGINT\n")
 
 
-def test_termination_at_import():
+def test_termination_at_import_has_line_and_exit_code():
     done = struck("typer", signal.SIGTERM)
     assert (done.returncode, done.stdout, done.stderr) == (143, "", "lapwing: ended by SIGTERM\n")
 
