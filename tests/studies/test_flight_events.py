@@ -16,7 +16,7 @@ SCENE = {
 
 
 def flown(voltage=None):
-    """Up at 1 s; two motors at their limit from 2 s on for 0.2 s; a failsafe at 3 s; down at 4 s."""
+    """Return a flight: up at 1 s, two motors at their limit for 0.2 s from 2 s on, a failsafe at 3 s, down at 4 s."""
     flying = (T >= 1.0) & (T < 4.0)
     if voltage is None:
         voltage = np.full((TICKS, 4), 20.0)

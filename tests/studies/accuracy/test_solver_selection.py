@@ -118,7 +118,7 @@ def test_cheapest_that_meets_accuracy_is_set(solver, overrides, measured_titles,
     ],
 )
 def test_only_candidates_are_compiled(solver, names, measured_titles, monkeypatch, tmp_path):
-    """Each integrator takes seconds to compile, and the others are nowhere the cheapest."""
+    """Each integrator takes seconds to compile, and the others are never the cheapest."""
     problems = []
     points = [Point(name, 4, "s", 0.004, 1e-9, 1e-5, 1, {}) for name in names]
     monkeypatch.setattr(solver_selection, "measure", lambda problem: problems.append(problem) or points)

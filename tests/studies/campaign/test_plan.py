@@ -24,7 +24,7 @@ def draw_values(new_plan, key):
         (loguniform(0.1, 100.0), stats.loguniform(0.1, 100.0)),
     ],
 )
-def test_quantiles_are_those_of_scipy(distribution, reference):
+def test_quantiles_equal_those_of_scipy(distribution, reference):
     for u in (0.001, 0.3, 0.5, 0.97):
         assert distribution.at(u) == pytest.approx(reference.ppf(u))
     assert parse(str(distribution)) == distribution
