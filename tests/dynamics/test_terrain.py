@@ -42,7 +42,7 @@ def test_nan_position_has_no_obstacle(ground):
     assert not over_plane(ground, nowhere) <= 0.0
 
 
-def test_grid_goes_through_its_points_and_counts_from_home():
+def test_grid_contains_its_points_relative_to_home():
     heights, ground = GRID["grid"], SMOOTH["grid"]
     assert surface(ground, 0.0, 0.0)[0] == 0.0
     for row, column in ((0, 0), (3, 7), (8, 10)):

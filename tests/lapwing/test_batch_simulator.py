@@ -108,7 +108,7 @@ def test_limits_of_motors_and_flow_are_bit_for_bit_single_vehicle(effect):
         assert np.array_equal(rows(end)[k], pack_row(one.motion))
 
 
-def test_members_are_reset_alone(batch):
+def test_members_are_reset_independently(batch):
     first = batch.reset()
     volts = np.full((N, 4), 33.0)
     after = batch.step(motor_voltages=volts, ticks=30)
@@ -270,7 +270,7 @@ def test_members_share_tables_of_numbers():
 
 
 @pytest.mark.long
-def test_accuracy_alone_selects_solver():
+def test_solver_is_selected_from_accuracy():
     batch = lapwing.BatchSimulator("hover", 1, overrides={"solver.accuracy": 1e-4})
     assert batch.step(motor_voltages=np.zeros((1, 4))).valid.all()
     with pytest.raises(ValueError, match=r"solver.accuracy: expected a number at least 1e-12"):

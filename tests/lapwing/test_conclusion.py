@@ -35,7 +35,7 @@ def test_landing_summary_has_speed_place_events_degrees(lapwing):
     assert "<td>leaves the ground</td>" in page
 
 
-def test_crash_has_its_own_exit_code(lapwing):
+def test_crash_has_separate_exit_code(lapwing):
     code, out, err = lapwing(*HOVER, *sets(FALL))
     assert (code, err.count("\n")) == (4, 1)
     assert "crashed; success.require: outcome in" in err

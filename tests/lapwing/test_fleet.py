@@ -35,7 +35,7 @@ def test_fleet_summary_has_outcomes_and_separation(flown):
     assert list(figures["vehicles"]) == ["left", "right", "scout"]
     assert all(one["outcome"]["kind"] == "completed" for one in figures["vehicles"].values())
     assert figures["separation"]["vehicles"][1] == "scout"
-    assert figures["separation"]["distance"] == pytest.approx(18.0**0.5, abs=0.1)  # as they stand
+    assert figures["separation"]["distance"] == pytest.approx(18.0**0.5, abs=0.1)  # initial positions
     assert "Nearest: " in output
     for name in figures["vehicles"]:
         flight = Flight.read(folder / "a.mcap", name)

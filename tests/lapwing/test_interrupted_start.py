@@ -9,7 +9,7 @@ import pytest
 
 STRIKE = """
 import os, signal, sys
-signal.signal(signal.SIGINT, signal.default_int_handler)  # whatever started the tests may have it ignored
+signal.signal(signal.SIGINT, signal.default_int_handler)  # the parent of the tests may ignore it
 struck = []
 def strike(event, arguments):
     if event == "import" and arguments[0] == "MODULE" and not struck:

@@ -85,7 +85,7 @@ def test_invalid_terminal_input_is_prompted_again(tmp_path):
     assert "rotors: expected a whole number, got 4.5" in output
     text = (tmp_path / "vehicles/mine.toml").read_text()
     assert "total = 1.5 " in text
-    assert "Guessed, not measured: arm, " in text  # what Enter took
+    assert "Guessed, not measured: arm, " in text  # answers by Enter
     assert "mass" not in text.splitlines()[1]
 
 

@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[2]
 VEHICLE = ROOT / "lapwing/scenes/vehicles/delivery_drone.toml"
 
 
-def test_scene_and_its_vehicle_give_same_card():
+def test_scene_and_its_vehicle_have_same_card():
     assert card(VEHICLE) == card(ROOT / "lapwing/scenes/hover.toml")
 
 

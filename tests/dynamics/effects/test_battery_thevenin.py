@@ -113,7 +113,7 @@ def delivered(drone, situation, rotors, rate, **table):
 
 
 @pytest.mark.parametrize("exponent", [1.05, 1.2])
-def test_exponent_gives_peukerts_law(drone, situation, rotors, exponent):
+def test_exponent_follows_peukerts_law(drone, situation, rotors, exponent):
     """The delivered charge is C = C_1 I^(1 - n) times the charge without the law."""
     for rate in (2.0, 10.0):
         plain = delivered(drone, situation, rotors, rate)
@@ -121,7 +121,7 @@ def test_exponent_gives_peukerts_law(drone, situation, rotors, exponent):
         assert delivered(drone, situation, rotors, rate, peukert_exponent=exponent) == pytest.approx(expected, rel=0.02)
 
 
-def test_branches_alone_are_near_peukerts_law(drone, situation, rotors):
+def test_branches_without_exponent_are_near_peukerts_law(drone, situation, rotors):
     """Reference: n = 1.05, usual for lithium polymer. theory.md lists the differences; 20 C is cut off early."""
     base = delivered(drone, situation, rotors, 1.0)
     differences = [delivered(drone, situation, rotors, r) / (base * r**-0.05) - 1.0 for r in (2.0, 5.0, 10.0, 20.0)]

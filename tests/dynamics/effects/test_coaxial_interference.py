@@ -76,7 +76,7 @@ def test_lower_rotor_loses_thrust_and_upper_does_not(drone):
     area, rho, v = math.pi * e.radius**2, 1.225, e.flow * 300.0
     u = through(e.pitch, t) * v
     w = (thrust[0] + 2.0 * rho * area * v * v) / (rho * area * u)  # far below: momentum
-    power = 0.5 * rho * area * u * w * w - 2.0 * rho * area * v**3  # what its disc adds to the flow: energy
+    power = 0.5 * rho * area * u * w * w - 2.0 * rho * area * v**3  # power of its disc: energy
     assert thrust[0] * u == pytest.approx(power, rel=1e-9)
     assert (torque - drag)[0] * 300.0 == pytest.approx(thrust[0] * u - plain[0] * v, rel=1e-9)
 
@@ -112,7 +112,7 @@ def test_slopes_equal_differences_of_plant_loads(drone):
         assert np.array(slopes.torque)[:, j] + own == pytest.approx(torque, abs=1e-8)
 
 
-def test_slopes_give_loads_at_equal_rotor_speeds(drone):
+def test_slopes_reproduce_loads_at_equal_rotor_speeds(drone):
     """Euler's theorem: loads are homogeneous in the squares of the speeds."""
     e, _ = effects.from_scene(BOTH, stacked(drone))
     slopes, t = e.slopes(), share(e.pitch, 1.0)

@@ -161,7 +161,7 @@ def test_friction_keeps_momentum_and_angular_momentum():
         assert turning == pytest.approx(np.zeros(3), abs=1e-12)
 
 
-def test_friction_takes_energy_and_never_reverses_slip():
+def test_friction_dissipates_energy_and_never_reverses_slip():
     rng = np.random.default_rng(4)
     for _ in range(20):
         velocity = tuple(rng.normal(0.0, 1.0, 3))

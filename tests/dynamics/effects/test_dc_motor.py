@@ -36,7 +36,7 @@ def test_loaded_balance_and_response_rate(drone, situation):
 def test_current_stays_within_controllers_limits(drone, situation):
     (e,) = effects.from_scene({"dc_motor": {}}, drone)
     _, current, _ = dc_motor.py_func(e, (), situation(speed=(0, 0, 400, 450)), NO_LOADS, (44.4, 0.0, 0.0, 44.4))
-    assert current[:3] == (26.5, 0.0, 0.0)  # Table 1; the controller would give 80
+    assert current[:3] == (26.5, 0.0, 0.0)  # Table 1; the controller's limit is 80
     assert 0 < current[3] < 26.5
 
 
@@ -62,7 +62,7 @@ def test_motor_power_is_at_most_peak_power(drone, situation):
     speeds = (0.0, 150.0, 200.0, 440.0)
     _, current, _ = dc_motor.py_func(e, (), situation(speed=speeds), NO_LOADS, (44.4,) * 4)
     power = [i * (K * w + R * i) for i, w in zip(current, speeds, strict=True)]
-    assert current[0] == 75.0  # a quarter of the pack's 30 C, 478 W; the controller would give 80
+    assert current[0] == 75.0  # a quarter of the pack's 30 C, 478 W; the controller's limit is 80
     assert power[1:3] == pytest.approx([1272.0] * 2)
     assert current[3] == pytest.approx((44.4 - K * 440.0) / R)
 

@@ -71,7 +71,7 @@ def test_log_undoes_exp_to_full_relative_accuracy(v):
     actual = so3.log(so3.exp(v))
     if abs(a - math.pi) < 1e-15:  # both signs of the half turn are right
         actual = [math.copysign(1.0, g * float(e)) * g for g, e in zip(actual, exact, strict=True)]
-    # beyond pi the matrix is rounded near the identity, which is what limits the difference
+    # beyond pi the matrix is rounded near the identity, which limits the accuracy
     allowed = 1e-14 * (abs(length - turns) if not turns else 1)
     assert worst(actual, exact) < allowed
 

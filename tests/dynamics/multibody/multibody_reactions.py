@@ -25,7 +25,7 @@ def reactions(system, configuration, velocity, solution: Solution, drive=None) -
     configuration, velocity, _, drive = as_float_arrays(system, configuration, velocity, None, drive)
     p = place(configuration, velocity)
     refuse_singular(system, p.singular)
-    e = equations(system.arrays, p, drive)  # twist columns: forces and torques, whatever the coordinates
+    e = equations(system.arrays, p, drive)  # twist columns: forces and torques in all coordinates
     n = len(system.bodies)
     out = {}
     for k, joint in enumerate(system.joints):

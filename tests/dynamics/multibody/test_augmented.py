@@ -93,7 +93,7 @@ def test_embedding_technique_agrees_with_augmented_form(driven):
         np.testing.assert_allclose(second.acceleration / scale, first.acceleration / scale, atol=1e-12)
 
 
-def test_euler_angles_and_quaternions_give_same_motion():
+def test_euler_angles_and_quaternions_have_same_motion():
     """theta'' of the Euler form, converted to omega', equals omega' of the quaternion form."""
     rng = np.random.default_rng(7)
     for _ in range(5):

@@ -86,7 +86,7 @@ def test_uneven_rotors_keep_momentum_without_friction():
     assert abs(total - total[0]).max() < 1e-8 * np.linalg.norm(total[0])
 
 
-def test_friction_takes_energy():
+def test_friction_dissipates_energy():
     p = CHAOTIC._replace(forcing_amplitude=0.0)
     _, states = simulate(get("rkmk4"), p, START, 0.01, 5000, every=50)
     energy = (states[:, 4:] ** 2 * INERTIA).sum(axis=1)
@@ -94,7 +94,7 @@ def test_friction_takes_energy():
     assert energy[-1] < 0.9 * energy[0]
 
 
-def test_neighbouring_starts_part_only_in_chaotic_case():
+def test_neighbouring_starts_diverge_only_in_chaotic_case():
     near = RigidBody(NO_ROTATION, (0.1 + 1e-9, 0.1, 0.1))
     strong = GE_LIN._replace(linear_gain=(100.0, 100.0, 100.0))
     growth = {}

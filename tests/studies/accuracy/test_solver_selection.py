@@ -61,7 +61,7 @@ def test_voltages_that_jump_count_with_their_share(accuracy, step, measured_titl
     assert solver_selection.overrides(scene, lambda text: None)[1] == f"solver.step={step!r}"
 
 
-def test_fleet_gets_one_solver_that_each_vehicle_meets(measured_titles, monkeypatch):
+def test_fleet_has_one_solver_that_meets_accuracy_of_each_vehicle(measured_titles, monkeypatch):
     """Each airframe is measured once."""
     points = [Point("rk4", 4, "s", h, 1e-12, 1e-5 / h, 1, {}) for h in (0.004, 0.002, 0.001)]
     errors = iter([(1e-5, 5e-6, 3e-7), (4e-4, 2e-4, 1e-6)])

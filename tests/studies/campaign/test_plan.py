@@ -70,7 +70,7 @@ def test_invalid_distribution_is_rejected(text, message):
         parse(text)
 
 
-def test_draws_depend_on_seed_run_and_key_alone():
+def test_draws_depend_on_seed_run_and_key_only():
     one = plan("hover", runs=50, seed=3, vary={"a": normal(0, 1), "b": uniform(0, 1)})
     more = plan("hover", runs=80, seed=3, vary={"c": uniform(0, 1), "b": uniform(0, 1)})
     assert draw_values(one, "b") == draw_values(more, "b")[:50]
