@@ -23,7 +23,7 @@ VARY = {"vehicle.mass": lapwing.normal(10.4, 0.3), "effects.random_wind_force.si
 
 
 @kernel
-def flown(method, p, key, state, command, h, n, ticks):
+def step_alone(method, p, key, state, command, h, n, ticks):
     for tick in range(ticks):
         state = multirotor.advance(method, p, key, tick, state, command, h, n)
     return state
@@ -43,7 +43,7 @@ def alone(k, volts, ticks, start=None):
     core, state = plant.core, plant.start.vehicle
     if start is not None:
         state = state._replace(motion=state.motion._replace(position_world=start))
-    return pack_row(flown(core.method, core.vehicle, core.key, state, volts, core.step, core.steps, ticks).motion)
+    return pack_row(step_alone(core.method, core.vehicle, core.key, state, volts, core.step, core.steps, ticks).motion)
 
 
 @pytest.mark.long
@@ -83,7 +83,7 @@ def test_rotors_at_limit_of_axial_inflow_are_bit_for_bit_single_vehicle():
             position_world=(0.0, 0.0, 50.0), velocity_world=(0.0, 0.0, v), rotor_speed=(400.0,) * 6
         )
         one = state._replace(motion=motion)
-        one = flown(core.method, core.vehicle, core.key, one, volts, core.step, core.steps, ticks)
+        one = step_alone(core.method, core.vehicle, core.key, one, volts, core.step, core.steps, ticks)
         assert np.array_equal(rows(end)[k], pack_row(one.motion))
 
 
@@ -104,7 +104,7 @@ def test_limits_of_motors_and_flow_are_bit_for_bit_single_vehicle(effect):
             position_world=(0.0, 0.0, 50.0), velocity_world=(0.0, 0.0, v), rotor_speed=(speeds[k],) * 4
         )
         one = state._replace(motion=motion)
-        one = flown(core.method, core.vehicle, core.key, one, volts, core.step, core.steps, ticks)
+        one = step_alone(core.method, core.vehicle, core.key, one, volts, core.step, core.steps, ticks)
         assert np.array_equal(rows(end)[k], pack_row(one.motion))
 
 
@@ -248,7 +248,7 @@ def test_members_over_any_terrain_are_bit_for_bit_single_vehicle(ground):
             position_world=tuple(starts[k].tolist()), velocity_world=(0.3, 0.0, -1.0)
         )
         state, key = plant.start.vehicle._replace(motion=motion), tuple(map(int, batch._keys[k]))
-        one = flown(core.method, core.vehicle, key, state, (0.0,) * 4, core.step, core.steps, 100)
+        one = step_alone(core.method, core.vehicle, key, state, (0.0,) * 4, core.step, core.steps, 100)
         assert np.array_equal(rows(end)[k], pack_row(one.motion))
     heights = np.array([surface(terrain_of(core), x, y)[0] for x, y, _ in end.position_world])
     assert (end.position_world[:, 2] > heights).all()

@@ -29,7 +29,7 @@ def steered(observed):
     return np.clip(np.column_stack([thrust, turn[:, :2] / 6.0, -0.3 * omega[:, 2]]), -1.0, 1.0)
 
 
-def flown(task, n=8, seconds=8.0):
+def fly_episode(task, n=8, seconds=8.0):
     environments = many(task, n)
     observed, _ = environments.reset(seed=3)
     total, ended = np.zeros(n), np.zeros(n, bool)
@@ -115,7 +115,7 @@ def test_single_environment_equals_first_of_vector():
 
 
 def test_controller_hovers():
-    _, observed, total, ended = flown("Hover")
+    _, observed, total, ended = fly_episode("Hover")
     assert not ended.any()
     assert np.abs(observed[:, :3]).max() < 0.1
     assert total.min() > 250.0  # of 400
@@ -133,7 +133,7 @@ def test_trained_policy_lands_softly():
 
 
 def test_trained_policy_flies_through_gates():
-    environments, _, total, ended = flown("Race", seconds=12.0)
+    environments, _, total, ended = fly_episode("Race", seconds=12.0)
     assert not ended.any()
     assert environments.unwrapped._episodes.gates.min() >= 2
     assert total.min() > 20.0

@@ -9,7 +9,7 @@ import pytest
 
 STRIKE = """
 import os, signal, sys
-signal.signal(signal.SIGINT, signal.default_int_handler)  # the parent of the tests may ignore it
+signal.signal(signal.SIGINT, signal.default_int_handler)  # whatever started the tests may have it ignored
 struck = []
 def strike(event, arguments):
     if event == "import" and arguments[0] == "MODULE" and not struck:
@@ -22,7 +22,7 @@ main()
 """
 
 
-def struck(module, number, output=subprocess.PIPE):
+def run_with_signal(module, number, output=subprocess.PIPE):
     """Run the command, which receives a signal just before it imports `module`."""
     code = textwrap.dedent(STRIKE).replace("MODULE", module).replace("NUMBER", number.name)
     return subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=output, text=True, check=False)
@@ -32,18 +32,18 @@ def struck(module, number, output=subprocess.PIPE):
     "module", ["lapwing.cosim.processes.interrupt", "lapwing.cli.main", "typer", "lapwing.cli.study_commands"]
 )
 def test_ctrl_c_at_import_has_line_and_exit_code(module):
-    done = struck(module, signal.SIGINT)
+    done = run_with_signal(module, signal.SIGINT)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "lapwing: ended by SIGINT\n")
 
 
 def test_termination_at_import_has_line_and_exit_code():
-    done = struck("typer", signal.SIGTERM)
+    done = run_with_signal("typer", signal.SIGTERM)
     assert (done.returncode, done.stdout, done.stderr) == (143, "", "lapwing: ended by SIGTERM\n")
 
 
 def test_exit_code_is_equal_with_closed_streams():
     with open("/dev/full", "w") as full:
-        assert struck("typer", signal.SIGINT, full).returncode == 130
+        assert run_with_signal("typer", signal.SIGINT, full).returncode == 130
 
 
 HALF_MADE = """

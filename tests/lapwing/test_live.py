@@ -37,7 +37,7 @@ def refused(address, **headers):
     return error.value.code
 
 
-def shaken(address, **headers):
+def handshake_status(address, **headers):
     """Return the status line of a WebSocket handshake."""
     host, port, path = re.fullmatch(r"http://([\d.]+):(\d+)(/.*)", address).groups()
     lines = {
@@ -106,10 +106,10 @@ def test_page_needs_its_secret_its_host_and_its_origin():
         assert refused(page.address, Origin="http://example.org") == 403
         assert refused(page.address, Origin="null") == 403
         own = f"http://127.0.0.1:{port}"
-        assert " 101 " in shaken(page.address, Origin=own)
-        assert " 403 " in shaken(page.address, Origin="http://example.org")
-        assert " 403 " in shaken(page.address, Host="example.org", Origin=own)
-        assert " 404 " in shaken(f"{own}/", Origin=own)
+        assert " 101 " in handshake_status(page.address, Origin=own)
+        assert " 403 " in handshake_status(page.address, Origin="http://example.org")
+        assert " 403 " in handshake_status(page.address, Host="example.org", Origin=own)
+        assert " 404 " in handshake_status(f"{own}/", Origin=own)
     with pytest.raises(urllib.error.URLError):
         get(page.address)
 

@@ -52,8 +52,8 @@ def test_pitch_through_90_degrees():
     q, v = arrays(x)
     before = sum(energy(system, q, v))
     passed = simulate(system, q, v, 1e-3, 400, record_every=400)
-    naive = simulate(system, *euler_from_quaternion(q, v), 1e-3, 400, record_every=400)
-    lost = [abs(sum(energy(system, m.configuration[-1], m.velocity[-1])) - before) for m in (passed, naive)]
+    baseline = simulate(system, *euler_from_quaternion(q, v), 1e-3, 400, record_every=400)
+    lost = [abs(sum(energy(system, m.configuration[-1], m.velocity[-1])) - before) for m in (passed, baseline)]
     assert lost[0] < 1e-8
     assert not lost[1] < 1e-3, lost
 
@@ -98,9 +98,9 @@ def test_light_propellers_at_1000_rad_per_s():
     np.testing.assert_allclose(momentum(drone, end), momentum(drone, x), rtol=1e-5)
     fine = integrate_fixed(RKMK4, flight, 0.0, x, 1e-4, 200000)
     np.testing.assert_allclose(end.attitude, fine.attitude, atol=1e-3)
-    p, naive = five(drone, (1.0, -0.7, 0.4), speeds, NOWHERE)
-    naive = advance(RENORMALISED, p, 0.0, naive, 1e-3, 5000, NONE)
-    assert not max(constraint_violation(p, naive)) < 1e-2
+    p, baseline = five(drone, (1.0, -0.7, 0.4), speeds, NOWHERE)
+    baseline = advance(RENORMALISED, p, 0.0, baseline, 1e-3, 5000, NONE)
+    assert not max(constraint_violation(p, baseline)) < 1e-2
 
 
 @pytest.mark.parametrize("driven", ["speed", "torque"])
@@ -188,10 +188,10 @@ def test_rank_without_initial_bound_locks_bricard():
     system, q, v = bricard()
     off = add_increment(q, 1e-6 * np.random.default_rng(1).normal(size=v.shape))
     no_load, no_drive = np.zeros((5, 6)), np.zeros((0, 2))
-    naive, _ = solve(system.arrays, off, v, no_load, no_drive, 0.0, 0.0, RANK_TOLERANCE, ANY)
+    baseline, _ = solve(system.arrays, off, v, no_load, no_drive, 0.0, 0.0, RANK_TOLERANCE, ANY)
     held, _ = solve(system.arrays, off, v, no_load, no_drive, 0.0, 0.0, RANK_TOLERANCE, 29)
     true = accelerations(system, q, v)
-    assert (naive.rank, held.rank, true.rank) == (30, 29, 29)
-    assert np.abs(naive.acceleration).max() < 1e-3
+    assert (baseline.rank, held.rank, true.rank) == (30, 29, 29)
+    assert np.abs(baseline.acceleration).max() < 1e-3
     np.testing.assert_allclose(held.acceleration, true.acceleration, atol=1e-3)
     assert np.abs(true.acceleration).max() > 1.0

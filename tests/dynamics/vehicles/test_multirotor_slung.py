@@ -31,7 +31,7 @@ def vehicle(sling):
     return slung.parameters(QUAD, sling, effects.from_scene({"gravity": {}, "rotor_thrust": {}}, QUAD))
 
 
-def flown(p, x, seconds, h=H):
+def simulate(p, x, seconds, h=H):
     state = slung.initial_state(p)._replace(motion=x)
     return slung.multirotor.advance(RK4, p, KEY, 0, state, (0.0,) * 4, h, round(seconds / h)).motion
 
@@ -85,7 +85,7 @@ def test_with_taut_cable_energy_and_both_momenta_are_kept():
     p = vehicle(SLING)
     x = begin(p, (0.05, 0.3, 97.9), (2.0, 0.5, 0.0), omega=(0.3, -0.2, 0.5))
     energy, momentum, angular = invariants(x)
-    after = invariants(flown(p, x, 3.0, 2.5e-4))
+    after = invariants(simulate(p, x, 3.0, 2.5e-4))
     assert after[0] == pytest.approx(energy, abs=1e-5)
     assert after[1] == pytest.approx(momentum - [0.0, 0.0, 3.0 * G * (QUAD.mass.total + SLING.load_mass)], abs=1e-9)
     assert after[2] == pytest.approx(angular, abs=1e-7)
@@ -93,7 +93,7 @@ def test_with_taut_cable_energy_and_both_momenta_are_kept():
 
 def test_on_slack_cable_both_fall_freely():
     p = vehicle(SLING)
-    x = flown(p, begin(p, (0.5, 0.0, 99.5), (0.3, 0.2, 1.0), velocity=(0.1, 0.0, 0.0)), 0.8)
+    x = simulate(p, begin(p, (0.5, 0.0, 99.5), (0.3, 0.2, 1.0), velocity=(0.1, 0.0, 0.0)), 0.8)
     assert x.load_position == pytest.approx((0.74, 0.16, 99.5 + 0.8 - 0.32 * G), abs=1e-9)
     assert x.vehicle.position_world == pytest.approx((0.08, 0.0, 100.0 - 0.32 * G), abs=1e-9)
     assert x.vehicle.omega_body == (0.0, 0.0, 0.0)
@@ -105,7 +105,7 @@ def test_taut_cable_force_is_bounded_by_stiffness():
     p, speed = vehicle(sling), 1.5
     x, most = begin(p, (0.0, 0.0, 98.2), (0.0, 0.0, -speed)), 0.0
     for _ in range(250):
-        x = flown(p, x, 1e-3, 2.5e-4)
+        x = simulate(p, x, 1e-3, 2.5e-4)
         most = max(most, math.hypot(*python_function(slung.cable)(sling, (1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0), x)[0]))
     reduced = 1.0 / (1.0 / sling.load_mass + 1.0 / QUAD.mass.total)
     assert most == pytest.approx(speed * math.sqrt(sling.stiffness * reduced), rel=2e-3)
@@ -163,6 +163,6 @@ def test_load_rebounds_from_taut_cable_as_damped_spring(h):
     seconds = 0.1
     stretch, rate = rebound(slack, speed, w, ratio, seconds)
     apart = SLING.length + stretch
-    x = flown(p, begin(p, (0.0, 0.0, 100.0 - SLING.length + slack), (0.0, 0.0, -speed)), seconds, h)
+    x = simulate(p, begin(p, (0.0, 0.0, 100.0 - SLING.length + slack), (0.0, 0.0, -speed)), seconds, h)
     assert x.vehicle.position_world[2] - x.load_position[2] == pytest.approx(apart, abs=1e-7)
     assert x.vehicle.velocity_world[2] - x.load_velocity[2] == pytest.approx(rate, abs=1e-7)
