@@ -1,4 +1,4 @@
-"""The layouts for viewers name topics and fields that there are."""
+"""Layouts for viewers name existing topics and fields."""
 
 import json
 import re
@@ -26,7 +26,7 @@ def check(topic, fields):
 
 
 def foxglove():
-    """Panels of the layout for Foxglove, by identifier."""
+    """Return the layout for Foxglove."""
     return json.loads((FOLDER / "foxglove.json").read_text())
 
 
@@ -38,7 +38,7 @@ def test_foxglove_layout_uses_existing_fields():
         check(topic, fields)
 
 
-def test_foxglove_shows_topics_that_there_are():
+def test_foxglove_shows_existing_topics():
     panels = foxglove()["configById"]
     shown = [
         *panels["3D!space"]["topics"],

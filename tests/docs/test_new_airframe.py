@@ -1,4 +1,4 @@
-"""The guide to a new airframe: its example is sound, and what it computes is what stands in the example."""
+"""Guide to a new airframe: its example is valid and has the values that its code computes."""
 
 import re
 import tomllib
@@ -39,7 +39,7 @@ def test_thrust_stand_data_reproduce_example_propeller():
     assert rho * torque_coefficient(met) * n**2 * D**5 == pytest.approx(names["torque"], rel=1e-3)
 
 
-def test_example_could_fly():
+def test_example_can_hover_and_fly():
     vehicle = Airframe.model_validate(EXAMPLE)
     assert 1.8 < performance.maximum_thrust(vehicle) / (vehicle.mass.total * performance.GRAVITY) < 2.5
     assert performance.trim(vehicle).thrust == pytest.approx(2.0 * 9.80665 / 4.0)

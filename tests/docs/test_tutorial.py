@@ -1,4 +1,4 @@
-"""The tutorial's blocks run in order as they stand there, in an empty folder."""
+"""The code blocks of the tutorial run unchanged, in order, in an empty folder."""
 
 import re
 from pathlib import Path
@@ -17,7 +17,7 @@ BLOCKS = re.findall(r'```python(?: title="(.*?)")?\n(.*?)```', PAGE, re.DOTALL)
 @pytest.fixture
 def folder(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    monkeypatch.syspath_prepend(str(tmp_path))  # as of a script that lies there
+    monkeypatch.syspath_prepend(str(tmp_path))  # like a script in this folder
     before = matplotlib.get_backend()
     matplotlib.use("Agg")
     yield tmp_path

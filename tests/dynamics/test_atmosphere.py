@@ -1,4 +1,4 @@
-"""The atmosphere against published tables, and against the hydrostatic balance that it is."""
+"""Atmosphere against published tables and the hydrostatic balance."""
 
 import pytest
 from mpmath import mp, mpf
@@ -34,7 +34,7 @@ def test_published_table(altitude, kelvin, pascal, rho):
 @pytest.mark.parametrize("air", [STANDARD, WARM])
 @pytest.mark.parametrize("altitude", [0.0, 280.0, 5000.0, 15_000.0])
 def test_pressure_carries_air_above(air, altitude):
-    """dp/dz = -rho g, whatever the day."""
+    """dp/dz = -rho g on every day."""
     slope = (pressure(air, altitude + 1.0) - pressure(air, altitude - 1.0)) / 2.0
     gravity = 9.80665 * (6_356_766.0 / (6_356_766.0 + altitude)) ** 2
     assert slope == pytest.approx(-density(air, altitude) * gravity, rel=1e-6)

@@ -1,4 +1,4 @@
-"""Faults as values, and the sentence that they become."""
+"""Text, key and pickling of configuration errors."""
 
 import pickle
 
@@ -20,7 +20,7 @@ from lapwing.dynamics.config_error import ConfigError
          "a: unknown effect 'x'; expected one of rain, wind"),
     ],
 )  # fmt: skip
-def test_line(error, text):
+def test_error_has_expected_text(error, text):
     assert str(error) == text
     assert isinstance(error, ValueError)
     assert str(pickle.loads(pickle.dumps(error))) == text

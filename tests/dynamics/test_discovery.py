@@ -1,4 +1,4 @@
-"""Discovery: the modules of a folder by name, and one error for every name that is not there."""
+"""Discovery of modules by name in a folder; errors for unknown names."""
 
 import sys
 
@@ -35,7 +35,7 @@ def test_one_module_is_imported_without_others(package):
     assert "discovered.second" not in sys.modules
 
 
-def test_all_modules_come_by_name(package, tmp_path):
+def test_all_modules_are_found_by_name(package, tmp_path):
     (tmp_path / package / "broken.py").write_text("VALUE = 0")
     result = discovery.modules(package)
     assert [(name, m.VALUE) for name, m in result.items()] == [("broken", 0), ("first", 1), ("second", 2)]
@@ -61,7 +61,7 @@ def test_unknown_name_lists_choices(package, name, message):
     assert str(raised.value) == message
 
 
-def test_mapping_is_chosen_from_alike():
+def test_choice_from_mapping_lists_choices():
     assert discovery.choose({"a": 1}, "a", "preset") == 1
     with pytest.raises(ValueError, match=r"unknown preset 'b' \(presets: a\)"):
         discovery.choose({"a": 1}, "b", "preset")

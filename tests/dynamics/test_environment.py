@@ -1,4 +1,4 @@
-"""The magnetic field against the test values that NOAA publishes with the World Magnetic Model."""
+"""Magnetic field against NOAA's published test values of the World Magnetic Model."""
 
 import datetime
 

@@ -1,4 +1,4 @@
-"""Against pymap3d (independent), and the pressure law against the standard atmosphere."""
+"""Geodesy against pymap3d, an independent implementation, and published gravity."""
 
 import numpy as np
 import pymap3d
@@ -25,7 +25,7 @@ def test_against_pymap3d(home):
 
 
 def test_directions():
-    """North raises the latitude, east the longitude, up the height."""
+    """A step north raises the latitude, east the longitude, up the height."""
     home = Home()
     assert geodesy.enu_to_geodetic(home, (0.0, 0.0, 0.0)) == pytest.approx(tuple(home), abs=1e-9)
     assert geodesy.enu_to_geodetic(home, (0.0, 100.0, 0.0))[0] > home.latitude_deg + 8e-4

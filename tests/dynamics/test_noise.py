@@ -1,4 +1,4 @@
-"""Published vectors, an independent inverse of the normal distribution, and moments of what comes out."""
+"""Noise against published vectors, an independent normal quantile, and moments."""
 
 import numpy as np
 import pytest
@@ -82,7 +82,7 @@ def test_keys_are_stable_and_do_not_collide_at_seams():
 
 
 def test_golden_values_pin_bits():
-    """Golden, beside the published vectors above: a scene's noise must never change unseen."""
+    """Golden values detect any change of a scene's noise."""
     key = noise.stream_key(42, "drone1", "imu")
     uniform = (0.11378459015395492, 0.6023793310159817, 0.15549789380747825, 0.7433139720233157)
     normal = (-1.206644243225024, 0.2595105565941289, -1.0131347799287371)

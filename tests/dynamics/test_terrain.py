@@ -1,4 +1,4 @@
-"""The ground: its gradient, the nearest face of what stands on it, what a ray meets, and what is refused."""
+"""Terrain: gradient, nearest face of an obstacle, ray casts, and rejected options."""
 
 import math
 
@@ -21,7 +21,7 @@ STAIR = relief(steps=[(1.0, 0.2), (2.0, 0.2), (3.0, -0.9)], step_heading=math.pi
 
 
 @pytest.mark.parametrize("ground", SMOOTH.values(), ids=SMOOTH)
-def test_normal_is_that_of_gradient(ground):
+def test_normal_follows_gradient(ground):
     h = 1e-6
     for x, y in np.random.default_rng(2).uniform(-3.4, 3.4, (40, 2)):
         rise = [(surface(ground, x + h * a, y + h * b)[0] - surface(ground, x - h * a, y - h * b)[0]) / (2.0 * h)
@@ -42,7 +42,7 @@ def test_nan_position_has_no_obstacle(ground):
     assert not over_plane(ground, nowhere) <= 0.0
 
 
-def test_grid_goes_through_its_points_and_counts_from_home():
+def test_grid_contains_its_points_relative_to_home():
     heights, ground = GRID["grid"], SMOOTH["grid"]
     assert surface(ground, 0.0, 0.0)[0] == 0.0
     for row, column in ((0, 0), (3, 7), (8, 10)):
@@ -134,7 +134,7 @@ def test_empty_terrain_is_level_ground():
         ({"steps": [(2.0, 0.1), (1.0, 0.1)]}, "steps.distance: expected growing distances above 0 m, got [2.0, 1.0]"),
     ],
 )
-def test_refused(table, text):
+def test_invalid_terrain_is_rejected(table, text):
     with pytest.raises(ConfigError) as error:
         relief(**table)
     assert text in str(error.value)

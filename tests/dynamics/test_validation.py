@@ -1,4 +1,4 @@
-"""Texts of pydantic's validation errors."""
+"""Texts of validation errors by pydantic."""
 
 from typing import Annotated, Literal, NamedTuple
 
@@ -66,7 +66,7 @@ class Tuple(NamedTuple):
         ({"inner": {"share": float("nan")}}, "inner.share: expected a finite number, got nan"),
     ],
 )
-def test_model(table, text):
+def test_model_fault_has_key_value_and_expectation(table, text):
     with pytest.raises(ValidationError) as caught:
         Outer.model_validate(table)
     assert str(fault(caught.value, Outer)) == text
@@ -85,7 +85,7 @@ def test_model(table, text):
         ({"chrge": 0.5}, f"chrge: unknown key 'chrge'; did you mean charge? expected one of {KEYS}"),
     ],
 )
-def test_named_tuple(table, text):
+def test_named_tuple_fault_has_key_value_and_expectation(table, text):
     with pytest.raises(ValidationError) as caught:
         TypeAdapter(Tuple, config=ConfigDict(strict=True)).validate_python(table)
     assert str(fault(caught.value, Tuple)) == text

@@ -1,4 +1,4 @@
-"""`lapwing` called as its command, in this process."""
+"""Fixture that calls the command `lapwing` in this process."""
 
 import signal
 import sys
@@ -13,7 +13,7 @@ ROOT = Path.cwd()
 
 @pytest.fixture
 def lapwing(monkeypatch, tmp_path, capfd):
-    """Calls `lapwing` in an empty folder with the scenes in it: exit code, standard output, standard error."""
+    """Return a function that calls `lapwing` in a folder with only the scenes: exit code, output, errors."""
     (tmp_path / "scenes").symlink_to(ROOT / "lapwing/scenes")
     monkeypatch.chdir(tmp_path)
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}

@@ -1,4 +1,4 @@
-"""Every airframe that ships flies its scene with its own gains and lands; those that cannot are told of before."""
+"""Each shipped airframe flies its scene with its gains and lands, or `check` reports that it cannot."""
 
 import numpy as np
 import pytest

@@ -1,4 +1,4 @@
-"""`import lapwing`: controllers and estimators handed over, loaded scenes, campaigns; and what is wrong in one line."""
+"""`import lapwing`: passed controllers and estimators, loaded scenes, campaigns, and errors of one line."""
 
 import sys
 from typing import NamedTuple
@@ -30,7 +30,7 @@ SHORT = {"run.duration": 1.5}
 
 @pytest.fixture
 def altitude(tmp_path, monkeypatch):
-    """The class of a module on Python's path."""
+    """Yield the controller class of a module on Python's path."""
     (tmp_path / "given_altitude.py").write_text(MODULE)
     monkeypatch.syspath_prepend(tmp_path)
     import given_altitude
@@ -49,7 +49,7 @@ def test_class_copy_and_name_of_controller_fly_alike(altitude):
         lapwing.fly(lapwing.load_scene("hover", SHORT), controller=type("Local", (altitude,), {})),
     ]
     assert {flight.digest for flight in flights} == {named.digest}
-    assert [len(flight.setup.modules) for flight in flights] == [1, 1, 0, 0]  # text that a log would carry
+    assert [len(flight.setup.modules) for flight in flights] == [1, 1, 0, 0]  # text that a log would store
     assert named.digest != lapwing.fly("hover", SHORT, controller=altitude, controller_options={"extra": 9.0}).digest
 
 
@@ -59,7 +59,7 @@ def test_edited_class_flies_with_its_passed_source(altitude, tmp_path):
     assert lapwing.fly("hover", SHORT, controller=altitude).digest == before.digest
 
 
-def test_estimator_is_handed_over_in_same_way():
+def test_estimator_class_is_accepted_like_controller():
     class Blind:
         rate = 250
 
@@ -74,7 +74,7 @@ def test_estimator_is_handed_over_in_same_way():
 
 
 class Faulty(NamedTuple):
-    """A controller that returns what it is told to, and its rate."""
+    """A controller with a configured rate that returns a configured value or raises."""
 
     output: object
     rate: float = 250.0
@@ -118,7 +118,7 @@ def test_controller_options_need_class_and_autopilot():
         lapwing.fly("gyrostat_chaotic", controller=Faulty(None))
 
 
-def test_loaded_scene_takes_more_overrides_and_later_ones_hold():
+def test_later_overrides_of_loaded_scene_take_precedence():
     scene = lapwing.load_scene("hover", {"run.duration": 1.5, "run.seed": 3})
     again = lapwing.load_scene(scene, ["run.duration=0.5"])
     assert (again.lookup("run.duration"), again.lookup("run.seed")) == (0.5, 3)
@@ -159,7 +159,7 @@ def test_campaign_varies_loaded_scene_by_seed_and_run():
         (lambda: lapwing.Simulator("gyrostat_chaotic"), "autopilot: the scene has no autopilot"),
     ],
 )
-def test_mistakes_are_scene_errors_of_one_line(wrong, text):
+def test_invalid_arguments_are_scene_errors_of_one_line(wrong, text):
     with pytest.raises(lapwing.SceneError) as caught:
         wrong()
     assert text in str(caught.value)

@@ -1,4 +1,4 @@
-"""Vehicles stepped side by side: the bits of one alone, resets, parameters of each, and commands of body rates."""
+"""Batches of vehicles: bit-for-bit equality with single vehicles, resets, parameters per member, body rates."""
 
 import re
 
@@ -23,7 +23,7 @@ VARY = {"vehicle.mass": lapwing.normal(10.4, 0.3), "effects.random_wind_force.si
 
 
 @kernel
-def flown(method, p, key, state, command, h, n, ticks):
+def step_alone(method, p, key, state, command, h, n, ticks):
     for tick in range(ticks):
         state = multirotor.advance(method, p, key, tick, state, command, h, n)
     return state
@@ -35,7 +35,7 @@ def batch():
 
 
 def alone(k, volts, ticks, start=None):
-    """The numbers of the motion of member k after so many ticks, stepped by itself."""
+    """Return the motion of member k after `ticks` ticks, simulated alone."""
     from lapwing.studies.campaign.plan import plan
 
     values = plan(MISSION, (), N, 5, VARY).overrides_of(k)
@@ -43,11 +43,11 @@ def alone(k, volts, ticks, start=None):
     core, state = plant.core, plant.start.vehicle
     if start is not None:
         state = state._replace(motion=state.motion._replace(position_world=start))
-    return pack_row(flown(core.method, core.vehicle, core.key, state, volts, core.step, core.steps, ticks).motion)
+    return pack_row(step_alone(core.method, core.vehicle, core.key, state, volts, core.step, core.steps, ticks).motion)
 
 
 @pytest.mark.long
-def test_members_are_stepped_side_by_side_in_vector_registers(batch):
+def test_members_are_stepped_in_vector_registers(batch):
     batch.reset()
     batch.step(motor_voltages=np.full((N, 4), 31.0))
     for compiled in kernels.advance.overloads.values():
@@ -58,7 +58,7 @@ def rows(state):
     return np.column_stack(state[1:6])
 
 
-def test_every_member_has_bits_of_one_vehicle_alone(batch):
+def test_every_member_is_bit_for_bit_single_vehicle(batch):
     batch.reset()
     volts = np.linspace(31.0, 35.0, 4 * N).reshape(N, 4)  # some stay on the ground, some take off
     end = batch.step(motor_voltages=volts, ticks=125)
@@ -69,8 +69,8 @@ def test_every_member_has_bits_of_one_vehicle_alone(batch):
 
 
 @pytest.mark.long
-def test_rotors_at_limit_of_axial_inflow_have_bits_of_one_alone():
-    """Two members of three meet the limit, whose steps are under error control."""
+def test_rotors_at_limit_of_axial_inflow_are_bit_for_bit_single_vehicle():
+    """Two of three members reach the limit, whose steps have error control."""
     batch, ticks, volts = lapwing.BatchSimulator("hexacopter_tilted", 3), 25, (4.0, 5.0, 3.0, 6.0, 4.5, 5.5)
     start = {"position_world": (0.0, 0.0, 50.0), "rotor_speed": np.full((3, 6), 400.0)}
     climb = [0.0, 6.0, -6.0]
@@ -83,14 +83,14 @@ def test_rotors_at_limit_of_axial_inflow_have_bits_of_one_alone():
             position_world=(0.0, 0.0, 50.0), velocity_world=(0.0, 0.0, v), rotor_speed=(400.0,) * 6
         )
         one = state._replace(motion=motion)
-        one = flown(core.method, core.vehicle, core.key, one, volts, core.step, core.steps, ticks)
+        one = step_alone(core.method, core.vehicle, core.key, one, volts, core.step, core.steps, ticks)
         assert np.array_equal(rows(end)[k], pack_row(one.motion))
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("effect", ["dc_motor={}", "dc_motor={inductance=5e-5}", "dynamic_inflow={}"])
-def test_limits_of_motors_and_flow_have_bits_of_one_alone(effect):
-    """Rotors of two members of three reach a limit, whose steps are under error control."""
+def test_limits_of_motors_and_flow_are_bit_for_bit_single_vehicle(effect):
+    """Rotors of two of three members reach a limit, whose steps have error control."""
     overrides, ticks, volts = [f"effects.{effect}"], 25, (28.0, 31.0, 30.0, 33.0)
     batch = lapwing.BatchSimulator("hover", 3, overrides=overrides)
     speeds, climb = [310.0, 335.0, 150.0], [0.0, 6.0, -6.0]
@@ -104,11 +104,11 @@ def test_limits_of_motors_and_flow_have_bits_of_one_alone(effect):
             position_world=(0.0, 0.0, 50.0), velocity_world=(0.0, 0.0, v), rotor_speed=(speeds[k],) * 4
         )
         one = state._replace(motion=motion)
-        one = flown(core.method, core.vehicle, core.key, one, volts, core.step, core.steps, ticks)
+        one = step_alone(core.method, core.vehicle, core.key, one, volts, core.step, core.steps, ticks)
         assert np.array_equal(rows(end)[k], pack_row(one.motion))
 
 
-def test_members_are_reset_alone(batch):
+def test_members_are_reset_independently(batch):
     first = batch.reset()
     volts = np.full((N, 4), 33.0)
     after = batch.step(motor_voltages=volts, ticks=30)
@@ -133,14 +133,14 @@ def test_body_rates_are_followed_and_thrust_holds_weight():
     assert abs(end.velocity_world[3, 2]) < 0.5
 
 
-def test_body_rate_control_is_that_of_voltages_computed_in_numpy():
-    """The controller in numpy: torque, allocation by least squares, inverse of thrust = k speed^2, speed = u KV."""
+def test_body_rate_control_equals_voltages_computed_in_numpy():
+    """The reference in numpy: torque, allocation by least squares, inverse of thrust = k speed^2, speed = u KV."""
     one, other = (lapwing.BatchSimulator("hover", 3) for _ in range(2))
     for batch in (one, other):
         batch.reset(position_world=(0.0, 0.0, 50.0), rotor_speed=one.hover_speed, omega_body=(0.4, -0.3, 0.2))
     a = one._nominal_airframe
     inertia, x, y, z = np.array(a.inertia_body), a.rotor_x, a.rotor_y, np.array(a.reaction_sign) * a.torque_per_thrust
-    effect = np.array([np.ones(4), y, -np.array(x), z])  # of a rotor's thrust on thrust and torques
+    effect = np.array([np.ones(4), y, -np.array(x), z])  # effect of a rotor's thrust on thrust and torques
     thrust, rates = (
         one.weight * np.array([0.9, 1.0, 1.1]),
         np.array([[0.5, 0.0, 0.1], [0.0, 0.5, 0.0], [1.0, 1.0, 0.0]]),
@@ -220,8 +220,8 @@ def test_member_with_non_finite_number_is_marked():
 
 @pytest.mark.long
 @pytest.mark.parametrize("ground", ["slope", "bumps", "steps", "box and cylinder", "grid", "rotor table"])
-def test_members_over_any_terrain_have_bits_of_one_alone(ground):
-    """Drops onto the terrain, each at its own place, so that some land on an edge or beside it."""
+def test_members_over_any_terrain_are_bit_for_bit_single_vehicle(ground):
+    """The members drop onto different places, some on an edge or beside it."""
     overrides = {
         "slope": HILL,
         "bumps": {"environment.terrain.bump_height": 0.05, "environment.terrain.bump_length": 0.7},
@@ -248,7 +248,7 @@ def test_members_over_any_terrain_have_bits_of_one_alone(ground):
             position_world=tuple(starts[k].tolist()), velocity_world=(0.3, 0.0, -1.0)
         )
         state, key = plant.start.vehicle._replace(motion=motion), tuple(map(int, batch._keys[k]))
-        one = flown(core.method, core.vehicle, key, state, (0.0,) * 4, core.step, core.steps, 100)
+        one = step_alone(core.method, core.vehicle, key, state, (0.0,) * 4, core.step, core.steps, 100)
         assert np.array_equal(rows(end)[k], pack_row(one.motion))
     heights = np.array([surface(terrain_of(core), x, y)[0] for x, y, _ in end.position_world])
     assert (end.position_world[:, 2] > heights).all()
@@ -270,7 +270,7 @@ def test_members_share_tables_of_numbers():
 
 
 @pytest.mark.long
-def test_accuracy_alone_selects_solver():
+def test_solver_is_selected_from_accuracy():
     batch = lapwing.BatchSimulator("hover", 1, overrides={"solver.accuracy": 1e-4})
     assert batch.step(motor_voltages=np.zeros((1, 4))).valid.all()
     with pytest.raises(ValueError, match=r"solver.accuracy: expected a number at least 1e-12"):

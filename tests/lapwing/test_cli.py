@@ -1,4 +1,4 @@
-"""The command line: one line for every mistake, exit code 2, and nothing left behind."""
+"""Command line: every user error is one line with exit code 2 and leaves no files."""
 
 import os
 import signal
@@ -102,7 +102,7 @@ BAD = {
 
 
 @pytest.mark.parametrize(("arguments", "expected"), BAD.values(), ids=BAD)
-def test_bad_run_is_refused_in_one_line(lapwing, arguments, expected):
+def test_invalid_run_is_rejected_in_one_line(lapwing, arguments, expected):
     code, out, err = lapwing("run", *arguments)
     assert (code, out) == (2, "")
     assert err.startswith("lapwing: ")
@@ -147,7 +147,7 @@ def test_bad_run_is_refused_in_one_line(lapwing, arguments, expected):
         (["fly"], "No such command 'fly'"),
     ],
 )
-def test_other_commands_do_same(lapwing, arguments, expected):
+def test_other_invalid_commands_are_rejected_in_one_line(lapwing, arguments, expected):
     code, out, err = lapwing(*arguments)
     assert (code, out) == (2, "")
     assert err.startswith("lapwing: ")
@@ -162,7 +162,7 @@ def test_invalid_key_prefix_is_rejected(key_prefix):
         check_key_prefix(key_prefix)
 
 
-def test_refused_run_takes_folder_of_recordings_away_again(lapwing):
+def test_rejected_run_leaves_no_recordings_folder(lapwing):
     code, _, err = lapwing("run", HOVER, "--key-prefix", "a b")
     assert code == 2
     assert err.startswith("lapwing: --key-prefix a b: expected letters")
@@ -196,7 +196,7 @@ def test_help_lists_commands_in_groups_on_single_lines():
     assert without.stdout == result.stdout
 
 
-def test_scenes_are_listed_line_each_broken_ones_too(lapwing, tmp_path):
+def test_scenes_and_broken_scenes_are_listed_on_one_line_each(lapwing, tmp_path):
     (tmp_path / "broken.toml").write_text("[run\n")
     code, out, _ = lapwing("scenes")
     assert code == 0
@@ -244,7 +244,7 @@ def test_output_to_full_device_is_one_line_and_no_traceback(arguments):
 
 @pytest.mark.long
 def test_full_output_device_leaves_log(tmp_path):
-    lapwing.fly("hover", {"run.duration": 0.1})  # compiles: a notice of that would be the first that cannot be said
+    lapwing.fly("hover", {"run.duration": 0.1})  # compiles, since its notice would be the first failed output
     log = tmp_path / "log.mcap"
     command = [sys.executable, "-m", "lapwing", "run", "hover", "--set", "run.duration=1", "--mode", "single-process"]
     with FULL.open("w") as full:

@@ -1,4 +1,4 @@
-"""Notice and bar of compilation: only when something compiles, and without an estimate that has no basis."""
+"""Notice and bar of compilation: only when something compiles, without unfounded estimates."""
 
 import io
 import random
@@ -25,7 +25,7 @@ def setup():
 
 
 def compile_something():
-    new = random.random()  # the cache has none with this constant
+    new = random.random()  # the cache has no kernel with this constant
 
     @kernel
     def times(x):
@@ -36,7 +36,7 @@ def compile_something():
 
 
 class Compiling:
-    """Stands for a graph: compiles when it is made, and has a tick to run."""
+    """Fake graph: compiles at construction and has a tick to run."""
 
     def __init__(self, *_):
         compile_something()
@@ -55,7 +55,7 @@ def test_compile_notice_appears_once_and_only_when_needed(setup):
     assert output == [Compilation("hover", SERVICES)]
 
 
-def test_terminal_has_bar_and_anything_else_line():
+def test_terminal_has_bar_and_other_streams_have_line():
     for terminal, expected in (
         (True, "   0 s  compiling hover, once"),
         (False, "hover: compiling kernels of plant, sensors (cached for later runs) ..."),
@@ -71,7 +71,7 @@ def test_terminal_has_bar_and_anything_else_line():
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_scenes_are_compiled_ahead_with_bar_or_line_each(setup, monkeypatch, terminal):
+def test_precompile_shows_bar_or_one_line_per_scene(setup, monkeypatch, terminal):
     monkeypatch.setattr(precompile, "BlockDiagram", Compiling)
     console = Console(file=io.StringIO(), force_terminal=terminal, width=100, markup=False)
     compile_ahead({"one": setup, "two": setup}, console)

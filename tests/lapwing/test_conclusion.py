@@ -35,7 +35,7 @@ def test_landing_summary_has_speed_place_events_degrees(lapwing):
     assert "<td>leaves the ground</td>" in page
 
 
-def test_crash_has_its_own_exit_code(lapwing):
+def test_crash_has_separate_exit_code(lapwing):
     code, out, err = lapwing(*HOVER, *sets(FALL))
     assert (code, err.count("\n")) == (4, 1)
     assert "crashed; success.require: outcome in" in err
@@ -89,7 +89,7 @@ def test_run_that_fails_early_ignores_older_log(lapwing, monkeypatch):
 @pytest.mark.long
 @pytest.mark.parametrize("scene", ["delivery_mission", "cooperative_load"])
 def test_end_of_run_reads_all_topics_that_it_shows(tmp_path, scene):
-    """Page, metrics and events need only some topics of a log with every sensor."""
+    """Page, metrics and events need only some topics of a log with all sensors."""
     log = package.fly(package.load_scene(scene, {"run.duration": 2.0})).save(tmp_path / "a.mcap")
     (part,), whole = FlightData.read_all(log, SHOWN), FlightData.read(log)
     assert set(part.topics) < set(whole.topics)

@@ -1,4 +1,4 @@
-"""Faults of the environment and of input files, through the real command: one line, no traceback, nothing left."""
+"""Faults of the environment and of input files, through the real command: one line, no traceback, no files left."""
 
 import os
 import subprocess

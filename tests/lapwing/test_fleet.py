@@ -1,4 +1,4 @@
-"""A scene of several vehicles from the command line: flown in both modes, told, reported, flown again."""
+"""Scene of several vehicles from the command line: both modes, summary, report, resimulation."""
 
 import json
 import subprocess
@@ -35,7 +35,7 @@ def test_fleet_summary_has_outcomes_and_separation(flown):
     assert list(figures["vehicles"]) == ["left", "right", "scout"]
     assert all(one["outcome"]["kind"] == "completed" for one in figures["vehicles"].values())
     assert figures["separation"]["vehicles"][1] == "scout"
-    assert figures["separation"]["distance"] == pytest.approx(18.0**0.5, abs=0.1)  # as they stand
+    assert figures["separation"]["distance"] == pytest.approx(18.0**0.5, abs=0.1)  # initial positions
     assert "Nearest: " in output
     for name in figures["vehicles"]:
         flight = Flight.read(folder / "a.mcap", name)
@@ -55,7 +55,7 @@ def test_report_shows_all_paths(flown):
     assert "quad_x" in page_text(page)
 
 
-def test_info_verify_and_refly_take_its_log(flown):
+def test_info_verify_and_resimulate_accept_log_of_fleet(flown):
     folder, _, figures = flown
     log = folder / "a.mcap"
     reported = command("info", log)

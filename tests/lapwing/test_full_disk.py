@@ -1,4 +1,4 @@
-"""A disk that is full: one line, and a whole log of what has been written before."""
+"""Full disk: one line, and a complete log of the data written before."""
 
 import subprocess
 import sys
@@ -36,8 +36,8 @@ def run(folder, size, mode):
 
 
 @pytest.mark.parametrize("mode", ["single-process", "multi-process"])
-def test_run_ends_with_one_line_and_whole_log(tmp_path, mode):
-    done = run(tmp_path, 400_000, mode)  # the first chunk has room, the second has not
+def test_run_ends_with_one_line_and_complete_log(tmp_path, mode):
+    done = run(tmp_path, 400_000, mode)  # the first chunk fits, the second does not
     assert done.returncode == 2
     assert done.stderr.count("\n") == 1
     assert "cannot write the log: File too large" in done.stderr
@@ -49,7 +49,7 @@ def test_run_ends_with_one_line_and_whole_log(tmp_path, mode):
     assert times == [k * 4_000_000 for k in range(1000)]
 
 
-def test_log_without_anything_flown_is_not_left(tmp_path):
+def test_log_without_flight_data_is_deleted(tmp_path):
     done = run(tmp_path, 20_000, "single-process")
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert list(tmp_path.iterdir()) == []

@@ -1,4 +1,4 @@
-"""Environments of Gymnasium: its own checker, one vehicle beside many, and a controller that does what is asked."""
+"""Gymnasium environments: its checker, single and vector environments, and controllers that solve the tasks."""
 
 import numpy as np
 import pytest
@@ -17,19 +17,19 @@ def many(task, n=8):
 
 
 def steered(observed):
-    """A proportional controller on what is observed: towards the target, upright, quiet."""
+    """Return actions of a proportional controller: towards the target, upright, without rotation."""
     way, past, R, omega = observed[:, 0:3], observed[:, 6:9], observed[:, 9:18].reshape(-1, 3, 3), observed[:, 18:21]
     expected = np.clip(1.2 * way, -3.0, 3.0) - 1.8 * past  # [m/s^2]
     tilt = np.clip(expected[:, :2] / 9.81, -0.5, 0.5)
     up = np.column_stack([tilt, np.ones(len(tilt))])
     up /= np.linalg.norm(up, axis=1)[:, None]
-    off = np.cross(R[:, :, 2], up)  # in the world: the axis to turn about
+    off = np.cross(R[:, :, 2], up)  # axis of the rotation in the world
     turn = 6.0 * np.einsum("nij,ni->nj", R, off) - 0.1 * omega
     thrust = expected[:, 2] / 9.81 + 1.0 / np.clip(R[:, 2, 2], 0.5, 1.0) - 1.0
     return np.clip(np.column_stack([thrust, turn[:, :2] / 6.0, -0.3 * omega[:, 2]]), -1.0, 1.0)
 
 
-def flown(task, n=8, seconds=8.0):
+def fly_episode(task, n=8, seconds=8.0):
     environments = many(task, n)
     observed, _ = environments.reset(seed=3)
     total, ended = np.zeros(n), np.zeros(n, bool)
@@ -83,7 +83,7 @@ def test_invalid_actions_are_rejected():
 
 
 @pytest.mark.parametrize("task", ["Hover", "Track"])
-def test_reward_is_that_of_closed_form(task):
+def test_reward_equals_closed_form(task):
     environments, n = many(task, 20), 20
     environments.reset(seed=6)
     for _ in range(30):
@@ -115,7 +115,7 @@ def test_single_environment_equals_first_of_vector():
 
 
 def test_controller_hovers():
-    _, observed, total, ended = flown("Hover")
+    _, observed, total, ended = fly_episode("Hover")
     assert not ended.any()
     assert np.abs(observed[:, :3]).max() < 0.1
     assert total.min() > 250.0  # of 400
@@ -133,13 +133,13 @@ def test_trained_policy_lands_softly():
 
 
 def test_trained_policy_flies_through_gates():
-    environments, _, total, ended = flown("Race", seconds=12.0)
+    environments, _, total, ended = fly_episode("Race", seconds=12.0)
     assert not ended.any()
     assert environments.unwrapped._episodes.gates.min() >= 2
     assert total.min() > 20.0
 
 
-def test_episode_that_is_over_begins_anew_alone():
+def test_finished_episode_restarts_without_others():
     environments = many("Hover", 2)
     environments.reset(seed=1)
     for _ in range(500):
@@ -154,6 +154,6 @@ def test_episode_that_is_over_begins_anew_alone():
     assert environments.unwrapped.batch.state.time[0] == 0.0 < environments.unwrapped.batch.state.time[1]
 
 
-def test_unknown_task():
+def test_unknown_task_is_rejected():
     with pytest.raises(ValueError, match="task: expected one of Hover, Track, Land, Race, got 'Swim'"):
         lapwing.gym.DroneVectorEnv(1, "Swim")

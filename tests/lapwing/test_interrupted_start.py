@@ -1,4 +1,4 @@
-"""Ctrl-C while the command still imports: one line and exit code 130, from its first statement on."""
+"""Ctrl-C during the imports of the command: one line and exit code 130, from its first statement on."""
 
 import signal
 import subprocess
@@ -22,8 +22,8 @@ main()
 """
 
 
-def struck(module, number, output=subprocess.PIPE):
-    """The command, which gets a signal as it is about to import `module`."""
+def run_with_signal(module, number, output=subprocess.PIPE):
+    """Run the command, which receives a signal just before it imports `module`."""
     code = textwrap.dedent(STRIKE).replace("MODULE", module).replace("NUMBER", number.name)
     return subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE, stderr=output, text=True, check=False)
 
@@ -31,19 +31,19 @@ def struck(module, number, output=subprocess.PIPE):
 @pytest.mark.parametrize(
     "module", ["lapwing.cosim.processes.interrupt", "lapwing.cli.main", "typer", "lapwing.cli.study_commands"]
 )
-def test_ctrl_c_at_import(module):
-    done = struck(module, signal.SIGINT)
+def test_ctrl_c_at_import_has_line_and_exit_code(module):
+    done = run_with_signal(module, signal.SIGINT)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "lapwing: ended by SIGINT\n")
 
 
-def test_termination_at_import():
-    done = struck("typer", signal.SIGTERM)
+def test_termination_at_import_has_line_and_exit_code():
+    done = run_with_signal("typer", signal.SIGTERM)
     assert (done.returncode, done.stdout, done.stderr) == (143, "", "lapwing: ended by SIGTERM\n")
 
 
 def test_exit_code_is_equal_with_closed_streams():
     with open("/dev/full", "w") as full:
-        assert struck("typer", signal.SIGINT, full).returncode == 130
+        assert run_with_signal("typer", signal.SIGINT, full).returncode == 130
 
 
 HALF_MADE = """

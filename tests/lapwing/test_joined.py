@@ -1,4 +1,4 @@
-"""A run whose services are started elsewhere has an outcome when one of them dies."""
+"""A run whose services are started separately has an outcome when one of them dies."""
 
 import json
 import os
@@ -30,7 +30,7 @@ def start(*words):
 
 @pytest.fixture(scope="module", autouse=True)
 def compiled():
-    """Kernels are there: a mission does not wait for them as long as a busy machine may take."""
+    """Compile the kernels first: a mission waits too short for compilation on a busy machine."""
     subprocess.run([sys.executable, "-m", "lapwing", "precompile", "hover"], check=True, capture_output=True)
 
 

@@ -1,4 +1,4 @@
-"""The schemas that editors use: they take what ships and refuse what the loader refuses."""
+"""Schemas for editors: they accept the shipped files and reject the same input as the loader."""
 
 import copy
 import tomllib
@@ -97,7 +97,7 @@ def test_schema_accepts_alternative_forms(key, value):
 def test_misspelt_key_of_airframe_or_gain_set_is_invalid():
     frame = tomllib.loads(FILES["airframe"][0].read_text())
     frame["mass"]["totl"] = frame["mass"].pop("total")
-    assert len(faults("airframe", frame)) == 2  # one that is unknown, one that is missing
+    assert len(faults("airframe", frame)) == 2  # one unknown key, one missing key
     gains = tomllib.loads(FILES["gains"][0].read_text())
     assert faults("gains", {**gains, "tiltlimit": 0.5})
 

@@ -31,12 +31,12 @@ class Sample(Base):
 
 
 class Plain(NamedTuple):
-    """Class without pydantic, like those of effects."""
+    """Class without pydantic, like the classes of effects."""
 
     size: Annotated[float, Gt(0), Le(5)] = 1.0  # [kg]
 
 
-def test_comments_are_those_behind_fields_and_of_base_classes():
+def test_comments_follow_fields_and_include_base_classes():
     assert comments(Sample) == {"first": "[m/s] how fast", "second": "[m], [rad] both"}
 
 
@@ -64,7 +64,7 @@ def test_keys_have_bounds_defaults_units_and_meanings():
 
 
 def _tables():
-    """Every table that people write, with those within it."""
+    """Return all tables of user files and their nested tables."""
     result = [*vocabulary().sections.values(), *KINDS.values(), Airframe, Phase, FaultTable]
     result += [settings for _, settings in effect_tables().values()] + [cls for _, cls in sensor_tables().values()]
     for table in result:

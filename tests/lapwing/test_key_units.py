@@ -1,4 +1,4 @@
-"""Units of scene keys, and the campaign's report that shows them."""
+"""Units of scene keys, and their display in the report of a campaign."""
 
 import os
 import subprocess

@@ -84,7 +84,7 @@ def test_files_follow_umask(tmp_path, umask, mode):
 
 @contextmanager
 def flight(tmp_path, *prefix):
-    """A run at speed 1, started by a command before it."""
+    """Yield a run at speed 1 whose command follows `prefix`."""
     words = ["run", HOVER, "--speed", "1", "--set", "run.duration=60", "--log", tmp_path / "a.mcap"]
     command = [*map(str, prefix), sys.executable, "-m", "lapwing", *map(str, words), "--key-prefix", "test-limits"]
     pipe = subprocess.PIPE
@@ -135,7 +135,7 @@ def test_process_killed_for_memory_is_named(tmp_path, megabytes):
         enter = ["sh", "-c", f'echo $$ > "{group}/cgroup.procs"; exec "$@"', "sh"]
         with flight(tmp_path, *enter) as process:
             out, error = process.communicate(timeout=PATIENCE)
-        deadline = time.monotonic() + PATIENCE  # processes notice that their launcher is gone
+        deadline = time.monotonic() + PATIENCE  # processes detect the end of their launcher
         while (left := (group / "cgroup.procs").read_text()) and time.monotonic() < deadline:
             time.sleep(0.2)
         assert not left

@@ -1,4 +1,4 @@
-"""A run on a page while it goes on: access to it, and what a browser draws."""
+"""Live page of a run: access, and drawing in a browser."""
 
 import os
 import re
@@ -37,8 +37,8 @@ def refused(address, **headers):
     return error.value.code
 
 
-def shaken(address, **headers):
-    """The status line of a WebSocket handshake."""
+def handshake_status(address, **headers):
+    """Return the status line of a WebSocket handshake."""
     host, port, path = re.fullmatch(r"http://([\d.]+):(\d+)(/.*)", address).groups()
     lines = {
         "Host": f"{host}:{port}",
@@ -55,7 +55,7 @@ def shaken(address, **headers):
 
 
 class Run:
-    """A run in this process, half a second a step, as a launcher would see it."""
+    """A run in this process that publishes steps of half a second, like a launcher."""
 
     def __init__(self, scene="hover", overrides=()):
         self.setup = resolve(load(scene, {"run.duration": 3.0, **dict(overrides)}))
@@ -77,7 +77,7 @@ class Run:
 
 @pytest.mark.filterwarnings("error::DeprecationWarning")
 def show(run, page, frames):
-    """Show a run at its start and in frames after it."""
+    """Show a run at its start and in later frames."""
     follow = LiveFeed(run.setup, [page.show])
     follow.observe(run)
     for _ in range(frames):
@@ -106,10 +106,10 @@ def test_page_needs_its_secret_its_host_and_its_origin():
         assert refused(page.address, Origin="http://example.org") == 403
         assert refused(page.address, Origin="null") == 403
         own = f"http://127.0.0.1:{port}"
-        assert " 101 " in shaken(page.address, Origin=own)
-        assert " 403 " in shaken(page.address, Origin="http://example.org")
-        assert " 403 " in shaken(page.address, Host="example.org", Origin=own)
-        assert " 404 " in shaken(f"{own}/", Origin=own)
+        assert " 101 " in handshake_status(page.address, Origin=own)
+        assert " 403 " in handshake_status(page.address, Origin="http://example.org")
+        assert " 403 " in handshake_status(page.address, Host="example.org", Origin=own)
+        assert " 404 " in handshake_status(f"{own}/", Origin=own)
     with pytest.raises(urllib.error.URLError):
         get(page.address)
 
@@ -130,7 +130,7 @@ def test_latest_scan_of_lidar_is_shown_live():
     run = Run(overrides={"sensors.lidar.columns": 36, "success.require": []})
     with LivePage(run.setup) as page:
         show(run, page, 3)
-        page._player.join(3.0)  # it shows the frames meanwhile
+        page._player.join(3.0)  # it shows the frames in the meantime
         (vehicle,) = page._vehicles
         cloud = vehicle._optional["lidar"]._cloud
     assert cloud.visible

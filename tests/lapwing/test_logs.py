@@ -1,4 +1,4 @@
-"""`lapwing info`, `verify`, `recover` and `export` on logs made up."""
+"""`lapwing info`, `verify`, `recover` and `export` on synthetic logs."""
 
 import csv
 import json
@@ -22,7 +22,7 @@ ABOUT = {"scene": "made_up", "seed": "7", "version": "0.1", "solver_integrator":
 
 
 def write(path, ticks=500, from_tick=500, by=0.0, without=range(0), **about):
-    """A vehicle that rises, and from a tick on is pushed aside ever farther."""
+    """Write a log of a climb in which the vehicle drifts sideways from a tick on."""
     with LogWriter(path, ABOUT | about, {"scene.toml": b"a = 1\n"}) as log:
         for k in range(ticks):
             time = k * TICK
@@ -67,7 +67,7 @@ def test_verify_recomputes_digest(lapwing, tmp_path):
 
 
 def test_verify_explains_log_of_another_machine(tmp_path):
-    """The command as a process, on a log whose provenance is that of another machine, and on one of another commit."""
+    """Run the command as a process on a log of another machine and on one of another commit."""
     recorded = {"python": "3.13.5", "packages": "numba 0.61.0", "system": "Linux glibc", "processor": "aarch64 A76"}
     path = write(tmp_path / "a.mcap", commit="0123456789ab", **recorded)
 
@@ -96,7 +96,7 @@ def test_verify_finds_first_difference_and_growth(lapwing, tmp_path):
     assert out.splitlines()[1] == "first difference: /drone1/ground_truth at t = 0.8 s, pose.position.x: 0.0 | 0.001"
     rows = [list(map(float, line.split())) for line in out.splitlines()[3:]]
     assert [row[0] for row in rows] == pytest.approx([0.0, 0.012, 0.1, 1.0, 1.196])
-    # pushed aside by 1 mm a tick, ticks are 4 ms
+    # drifts by 1 mm per tick of 4 ms
     assert [row[1] for row in rows] == pytest.approx([0.001 * (1 + row[0] / 0.004) for row in rows])
     assert [row[1] for row in rows] == [row[2] for row in rows]
 
@@ -110,7 +110,7 @@ def test_logs_of_equal_messages_are_equal_for_any_chunks(lapwing, tmp_path):
     assert (code, out) == (0, f"{path} and b.mcap: identical messages\n")
 
 
-def test_message_that_one_log_lacks_is_difference(lapwing, tmp_path):
+def test_missing_message_is_difference(lapwing, tmp_path):
     write(tmp_path / "a.mcap"), write(tmp_path / "b.mcap", without=[300])
     code, out, _ = lapwing("verify", "a.mcap", "b.mcap")
     assert code == 3
@@ -143,7 +143,7 @@ def test_recover_restores_flushed_messages(lapwing, tmp_path):
     with open("killed_recovered.mcap", "rb") as file:
         times = [m.log_time for _, _, m in make_reader(file, validate_crcs=True).iter_messages()]
     assert times == list(range(len(times)))
-    assert 3000 - len(times) <= 1000  # at 0.5 ms or more between messages: what was written in the last 0.5 s
+    assert 3000 - len(times) <= 1000  # intervals of 0.5 ms or more: messages written in the last 0.5 s
     assert f"{len(times)} messages up to t = {times[-1] * 1e-9:g} s" in out
     assert lapwing("verify", "killed_recovered.mcap")[0] == 0
 
@@ -212,7 +212,7 @@ def test_parquet_has_types_and_units(lapwing, tmp_path):
 
 @pytest.fixture
 def foreign(tmp_path):
-    """A log of another tool's."""
+    """Write a log of another tool."""
     path = tmp_path / "foreign.mcap"
     with path.open("wb") as file:
         writer = Writer(file)
@@ -237,7 +237,7 @@ OLD = "lapwing_msgs/msg/VehicleState has bool ground_contact where this version 
 
 @pytest.fixture
 def old(tmp_path, monkeypatch):
-    """A log of a version whose true state had no density of the air, cut off before its end; and the whole of it."""
+    """Write a log of a version without the air density in the true state, whole and cut off before its end."""
     text = VehicleState.schema_text.replace("float64 air_density", "#")
     monkeypatch.setattr(VehicleState, "schema_text", text)
     whole = write(tmp_path / "old.mcap", ticks=300, version="0.0.9").read_bytes()

@@ -27,7 +27,7 @@ NAME = "tether_drag"
 
 @pytest.fixture
 def scene(tmp_path):
-    """Loads the hover scene with a new effect beside it."""
+    """Return a function that loads the hover scene with a new effect."""
     write_module("effect", NAME, tmp_path)
     path = tmp_path / "hover.toml"
     path.write_text(Path("lapwing/scenes/hover.toml").read_text() + f'\n[effects.{NAME}]\nmodule = "{NAME}"\n')
@@ -60,7 +60,7 @@ def test_created_module_passes_its_test(tmp_path, kind):
 
 
 @pytest.mark.parametrize("kind", ["effect", "sensor", "controller", "estimator", "segment"])
-def test_created_module_flies_as_its_first_lines_say(tmp_path, kind):
+def test_created_module_flies_by_its_first_lines(tmp_path, kind):
     assert run(tmp_path, "lapwing", "new", "scene", "my_flight").returncode == 0
     assert run(tmp_path, "lapwing", "new", kind, f"my_{kind}").returncode == 0
     text = ast.get_docstring(ast.parse((tmp_path / f"my_{kind}.py").read_text()))
@@ -95,7 +95,7 @@ def test_existing_file_is_kept(tmp_path):
 
 
 @pytest.mark.parametrize("name", ["Tether", "tether-drag", "gravity", "numpy", "3d"])
-def test_other_names_are_refused(tmp_path, name):
+def test_invalid_names_are_rejected(tmp_path, name):
     with pytest.raises(ValueError, match="NAME"):
         write_module("effect", name, tmp_path)
     assert not any(tmp_path.iterdir())

@@ -1,4 +1,4 @@
-"""`lapwing new vehicle`: what it writes is sound and can hover; or it is refused in one line."""
+"""`lapwing new vehicle`: its file is valid and the vehicle can hover, or it is rejected in one line."""
 
 import math
 import os
@@ -22,7 +22,7 @@ from lapwing.vehicle_measurements import FIGURES
 @pytest.mark.parametrize(
     "figures", [{}, {"rotors": 6.0}, {"rotors": 8.0, "mass": 12.0}, {"mass": 0.25}, {"mass": 80.0}]
 )
-def test_guesses_make_vehicle_that_scene_takes(tmp_path, figures):
+def test_guesses_make_vehicle_that_scene_accepts(tmp_path, figures):
     path, remarks = write_vehicle("mine", figures, tmp_path)
     frame = load_airframe(path)
     assert not remarks
@@ -61,7 +61,7 @@ def in_a_terminal(folder, *answers, more=()):
     output, left, typed = b"", list(answers), b""
     while True:
         if not select.select([terminal], [], [], 1.0)[0]:
-            if typed == b"\x03":  # which Python does not hear that is about to wait for a line: as anybody, once more
+            if typed == b"\x03":  # Python misses Ctrl-C just before it waits for a line: repeat
                 os.write(terminal, typed)
             continue
         try:
@@ -69,7 +69,7 @@ def in_a_terminal(folder, *answers, more=()):
         except OSError:  # closed with the last process on it
             break
         if output.endswith((b"]: ", b"[y/N] ")):
-            typed = left.pop(0).encode() if left else b"\x04"  # who has no answer any more ends it
+            typed = left.pop(0).encode() if left else b"\x04"  # end the input after the last answer
             os.write(terminal, typed)
     return output.decode().replace("\r\n", "\n"), os.waitstatus_to_exitcode(os.waitpid(pid, 0)[1])
 
@@ -85,7 +85,7 @@ def test_invalid_terminal_input_is_prompted_again(tmp_path):
     assert "rotors: expected a whole number, got 4.5" in output
     text = (tmp_path / "vehicles/mine.toml").read_text()
     assert "total = 1.5 " in text
-    assert "Guessed, not measured: arm, " in text  # what Enter took
+    assert "Guessed, not measured: arm, " in text  # answers by Enter
     assert "mass" not in text.splitlines()[1]
 
 
@@ -101,7 +101,7 @@ def test_interrupted_interview_prints_its_answers(tmp_path, end, code, last):
     assert not (tmp_path / "vehicles").exists()
 
 
-def test_answers_that_do_not_go_together_are_not_lost(tmp_path):
+def test_answers_that_do_not_fit_together_are_printed(tmp_path):
     output, code = in_a_terminal(tmp_path, "1.5\n", "2\n", *["\n"] * 40)
     assert code == 2
     assert "with these answers: lapwing new vehicle mine --set mass=1.5 --set payload=2" in output
@@ -147,7 +147,7 @@ def test_weak_vehicle_is_warned_of_and_names_are_kept(tmp_path):
             write_vehicle(name, {}, tmp_path)
 
 
-def test_on_command_line(tmp_path, monkeypatch):
+def test_command_writes_vehicle_and_rejects_unknown_figure(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
     done = CliRunner().invoke(app, ["new", "vehicle", "mine", "--set", "mass=1.2"])
     assert done.exit_code == 0, done.output
@@ -158,7 +158,7 @@ def test_on_command_line(tmp_path, monkeypatch):
     assert "unknown figure 'mas'; did you mean mass?" in wrong.output
 
 
-def test_usual_motor_resistance_is_not_doubted():
+def test_usual_motor_resistance_is_accepted_without_question():
     (figure,) = (figure for figure in FIGURES if figure.name == "resistance")
     assert figure.plausibility_question(0.06, 1.1) == ""
     assert "is that the unit?" in figure.plausibility_question(60.0, 0.06)

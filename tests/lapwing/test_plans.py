@@ -1,4 +1,4 @@
-"""Plans of a fleet from the command line: which vehicle flies which, and that it does."""
+"""Plans of a fleet from the command line: assignment to vehicles, and flight."""
 
 import subprocess
 import sys
@@ -24,7 +24,7 @@ def test_one_vehicle_needs_no_name():
         plan_options.files([PLAN, PLAN], load("hover"))
 
 
-def test_of_several_those_that_are_named_are_operated():
+def test_named_vehicles_of_fleet_are_operated():
     values = [f"right={PLAN}"]
     assert plan_options.overrides(values, Path("fleet"), []) == [
         "vehicle.1.autopilot.accept_commands=true",

@@ -1,4 +1,4 @@
-"""`lapwing protocol`: what services hand to one another, as text, JSON or a picture."""
+"""`lapwing protocol`: ports between services as text, JSON or a picture."""
 
 import json
 

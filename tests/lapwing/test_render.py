@@ -25,7 +25,7 @@ def run(folder, *words):
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
-    """Three seconds of hover."""
+    """Return a log of three seconds of hover."""
     scene = package.load_scene("hover", {"run.duration": 3.0})
     return package.fly(scene).save(tmp_path_factory.mktemp("render") / "hover.mcap")
 

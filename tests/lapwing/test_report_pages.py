@@ -31,7 +31,7 @@ def run(folder, *arguments):
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory):
-    """Two flights of the delivery mission, a.mcap and b.mcap, with the report a.html of the first."""
+    """Return a folder with two delivery missions, a.mcap and b.mcap, and the report a.html of the first."""
     made = tmp_path_factory.mktemp("pages")
     for name, gains in (("a", "tuned"), ("b", "paper")):
         sets = ("--set", f"autopilot.gains={gains}")

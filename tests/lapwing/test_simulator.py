@@ -1,4 +1,4 @@
-"""Stepping a vehicle by hand: free fall, hovering thrust, setpoints, and the same bits after a reset."""
+"""Stepping of one vehicle: free fall, hover thrust, setpoints, and bit-for-bit identical steps after a reset."""
 
 import math
 import re

@@ -1,4 +1,4 @@
-"""A launcher that gets hardly any processor time does not make its run lose messages."""
+"""A run does not lose messages when its launcher has little processor time."""
 
 import os
 import subprocess

@@ -1,4 +1,4 @@
-"""A process that is stopped before it has read its specification ends the run by name."""
+"""A process that is stopped before it reads its specification ends the run with its name."""
 
 import os
 import signal

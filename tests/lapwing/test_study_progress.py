@@ -22,7 +22,7 @@ class Clock:
 
 
 def left(*reports, total):
-    """Text after reports (seconds, done)."""
+    """Return the text of the remaining time after reports (seconds, done)."""
     clock = Clock()
     remaining = TimeLeft(clock=clock)
     for clock.now, done in reports:
@@ -88,7 +88,7 @@ def test_no_estimate_of_work_with_unknown_workers():
     assert remaining.text(200) == ""
 
 
-def test_first_burst_of_workers_is_no_basis():
+def test_no_estimate_from_first_burst_of_workers():
     clock = Clock()
     remaining = TimeLeft(4, clock)
     for clock.now, done in ((60.0, 1), (60.1, 2), (62.0, 3), (63.0, 4), (120.0, 5), (121.0, 6)):
@@ -96,7 +96,7 @@ def test_first_burst_of_workers_is_no_basis():
         assert remaining.seconds(40) is None
 
 
-def test_time_left_is_that_of_equal_flights():
+def test_time_left_assumes_equal_flights():
     assert left((10.0, 1), (20.0, 2), (30.0, 3), total=10) == "about 70 s left"
     assert left((100.0, 1), (200.0, 2), (300.0, 3), total=10) == "about 12 min left"
 
@@ -131,7 +131,7 @@ def test_work_that_may_end_early_has_upper_bound():
     ("terminal", "expected"),
     [(True, "2 of 10 flights"), (False, r"2 of 10 flights: without \[gravity\]\n")],
 )
-def test_terminal_has_bar_and_anything_else_lines(terminal, expected):
+def test_terminal_has_bar_and_other_streams_have_lines(terminal, expected):
     console = Console(file=io.StringIO(), force_terminal=terminal, width=100, markup=False)
     with StudyProgress(console, "flights") as countdown:
         countdown.say("nominal", 1, 10)

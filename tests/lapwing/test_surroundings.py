@@ -1,4 +1,4 @@
-"""A run where something that is usual is missing: no home, nothing that can be written, a clock that jumps."""
+"""Runs in a broken environment: no home folder, read-only folders, a clock that jumps."""
 
 import json
 import os
@@ -24,7 +24,7 @@ def without_home(folder):
 
 
 def nothing_to_write(folder):
-    """Home, kernels and /dev/shm can be read at most."""
+    """Make home, kernels and /dev/shm read-only."""
     kept = cache_folder()
     if os.geteuid() != 0 or subprocess.run(["unshare", "--mount", "true"], capture_output=True, check=False).returncode:
         pytest.skip("mounts folders read-only, as root")

@@ -1,4 +1,4 @@
-"""`lapwing view` opens the page, or Rerun, whose converter finds nothing to warn of."""
+"""`lapwing view` opens the page, or Rerun, whose converter prints no warning."""
 
 import subprocess
 import webbrowser
@@ -11,7 +11,7 @@ from lapwing import rerun
 
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
-    """A second of the delivery mission, with all its sensors."""
+    """Return a log of one second of the delivery mission with all sensors."""
     scene = package.load_scene("delivery_mission", {"run.duration": 1.0})
     return package.fly(scene).save(tmp_path_factory.mktemp("view") / "mission.mcap")
 
@@ -45,7 +45,7 @@ def test_invalid_log_is_rejected_in_one_line(lapwing, log, monkeypatch, tmp_path
 def test_rerun_converts_log_without_warning(log, tmp_path):
     command = [rerun.program(), "mcap", "convert", str(log), "-o", str(tmp_path / "mission.rrd")]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
-    # Rerun makes the recording's name of the file's, and tells so of any with a dot in it.
+    # Rerun derives the recording's name from the file's and prints a message if it has a dot.
     output = [line for line in done.stderr.splitlines() if "WARN" in line and "Application ID" not in line]
     assert output == []
 

@@ -1,4 +1,4 @@
-"""A wheel: it installs one package, which flies, runs campaigns and connects MAVLink from any folder."""
+"""The wheel installs one package, which flies, runs campaigns and connects MAVLink from any folder."""
 
 import os
 import shutil
@@ -18,7 +18,7 @@ QUICK = ("--set", "run.duration=0.3", "--set", "success.require=[]")
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory):
-    """A folder into which a wheel of this checkout is installed without its dependencies."""
+    """Return a folder with an installed wheel of this checkout, without its dependencies."""
     folder = tmp_path_factory.mktemp("wheel")
     source = folder / "source"
     for name in ("lapwing", "messages", "services"):

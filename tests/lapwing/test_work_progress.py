@@ -1,4 +1,4 @@
-"""Progress bar of `fly`, `Simulator` and `campaign` in a terminal, as a process sees it."""
+"""Progress bar of `fly`, `Simulator` and `campaign` in the terminal of a process."""
 
 import os
 import pty

@@ -13,7 +13,7 @@ FLU_FRD = np.diag([1.0, -1.0, -1.0])
 
 
 def ned(flight):
-    """Quantities in NED and FRD, by rotation matrices."""
+    """Return quantities in NED and FRD, by rotation matrices."""
     world = ENU_NED @ Rotation.from_quat(flight.attitude[:, [1, 2, 3, 0]]).as_matrix() @ FLU_FRD
     turn = Rotation.from_matrix(world)
     return {
@@ -92,7 +92,7 @@ BOOT = 5.0  # [s] since boot, of a telemetry log's first message
 
 
 def telemetry(v, k):
-    """Messages of a telemetry log's sample k."""
+    """Return the messages of sample k of a telemetry log."""
     from pymavlink.dialects.v20 import common as mavlink
 
     ms = round(1e3 * BOOT) + 10 * k

@@ -15,7 +15,7 @@ HOURS = (TICKS - 1) / RATE / 3600.0
 
 
 def flight(charge=True, **effect):
-    """36 s at 20 A and 15 V: 0.2 A h, 3 W h."""
+    """Return a flight of 36 s at 20 A and 15 V: 0.2 A h, 3 W h."""
     t = np.arange(TICKS) / RATE
     truth = {
         "pose.position": np.column_stack([0.0 * t, 0.0 * t, t]),
@@ -45,7 +45,7 @@ def test_constant_current_draws_power_times_time():
 
 
 @pytest.mark.parametrize(("effect", "cutoff"), [({}, 12.0), ({"cutoff_voltage": 3.3}, 13.2)])
-def test_cutoff_is_that_of_scene(effect, cutoff):
+def test_cutoff_is_read_from_scene(effect, cutoff):
     use = battery_use(flight(**effect))
     assert use.cutoff == pytest.approx(cutoff)
     assert f"{cutoff:.1f} V at the cut-off" in str(use)

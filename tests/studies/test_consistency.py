@@ -54,7 +54,7 @@ def test_rotation_vector_equals_scipy():
 
 
 def vertical_speed_sigmas(flight):
-    """Greatest error of the vertical velocity, in standard deviations of the estimate, after two seconds."""
+    """Return the largest error of the vertical velocity after two seconds, in standard deviations of the estimate."""
     e, t = flight.estimate, flight.truth
     rows = np.searchsorted(t.times, e.times - 1e-6)
     late = e.times > 2.0
@@ -64,7 +64,7 @@ def vertical_speed_sigmas(flight):
 @pytest.mark.long
 @pytest.mark.parametrize("overrides", [HOVER, {}, WIND, GPS_LOSS], ids=["hover", "mission", "wind", "gps loss"])
 def test_joint_nees_is_within_its_bounds(overrides):
-    seeds = range(101, 201)  # one flight after the other: a hundred take 5 GB
+    seeds = range(101, 201)  # one flight at a time: a hundred take 5 GB
     values = [metrics(lapwing.fly("delivery_mission", seed=seed, overrides=overrides))["nees"] for seed in seeds]
     low, high = consistency.bounds(consistency.JOINT, len(seeds))
     assert low < np.mean(values) < high

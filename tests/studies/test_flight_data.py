@@ -105,7 +105,7 @@ def test_landed_means_upright_slow_and_in_contact():
     assert ended(**{"ground_contact": False, "pose.position": stood}).landed
 
 
-def test_landed_needs_autopilots_word():
+def test_landed_requires_report_of_autopilot():
     truth = {"pose.position": (0.0, 0.0, 0.0), "pose.orientation": synthetic_flights.LEVEL, "velocity": (0.0, 0.0, 0.0),
              "ground_contact": True}  # fmt: skip
     assert not synthetic_flights.flight(10, ground_truth=truth).landed

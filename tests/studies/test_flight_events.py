@@ -15,8 +15,8 @@ SCENE = {
 }
 
 
-def flown(voltage=None):
-    """Up at 1 s; two motors at their limit from 2 s on for 0.2 s; a failsafe at 3 s; down at 4 s."""
+def example_flight(voltage=None):
+    """Return a flight: up at 1 s, two motors at their limit for 0.2 s from 2 s on, a failsafe at 3 s, down at 4 s."""
     flying = (T >= 1.0) & (T < 4.0)
     if voltage is None:
         voltage = np.full((TICKS, 4), 20.0)
@@ -48,7 +48,7 @@ def flown(voltage=None):
 
 
 def test_events_are_listed_in_order():
-    assert [tuple(event) for event in flown().events] == [
+    assert [tuple(event) for event in example_flight().events] == [
         (0.0, "mode", "mission"),
         (0.0, "phase", "climb"),
         (1.0, "arming", "armed"),
@@ -74,7 +74,7 @@ def test_flight_without_autopilot_has_no_events():
 def test_saturation_is_one_event_with_its_share():
     voltage = np.full((TICKS, 4), 20.0)
     voltage[120:130, 0] = voltage[300:330, 2] = 40.0
-    (event,) = [event for event in flown(voltage).events if event.kind == "motors"]
+    (event,) = [event for event in example_flight(voltage).events if event.kind == "motors"]
     assert event.time == 1.2
     assert event.text == "motors 1, 3 at 40 V for 0.40 s (2 times), 13 % of the time in the air"
 
@@ -82,7 +82,7 @@ def test_saturation_is_one_event_with_its_share():
 def test_timeline_shows_each_span_of_saturation_with_its_share():
     voltage = np.full((TICKS, 4), 20.0)
     voltage[120:130, 0] = voltage[300:330, 2] = 40.0
-    marks = [mark for mark in timeline.draw(flown(voltage)).panels[0].marks if mark.lane == "motor limit"]
+    marks = [mark for mark in timeline.draw(example_flight(voltage)).panels[0].marks if mark.lane == "motor limit"]
     assert [(round(mark.start, 9), round(mark.end, 9), mark.text) for mark in marks] == [
         (1.2, 1.3, "motor 1 at 40 V for 0.10 s, 3.3 % of the time in the air"),
         (3.0, 3.3, "motor 3 at 40 V for 0.30 s, 10 % of the time in the air"),

@@ -1,4 +1,4 @@
-"""The topics of a flight as arrays and tables."""
+"""Topics of a flight as arrays and tables."""
 
 import sys
 

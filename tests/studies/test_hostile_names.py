@@ -26,7 +26,7 @@ PHASES = np.full(flights_in_space.TICKS, HOSTILE, object)
 
 
 def flight():
-    """Every name is hostile that a scene or a log chooses."""
+    """Return a flight in which all names from scene and log are hostile."""
     setpoint = {"position": (0.0, 0.0, 1.0), "yaw": 0.0, "phase": PHASES}
     values = flights_in_space.flight(setpoint=setpoint)
     values.origin = copy.copy(values.origin)
@@ -39,7 +39,7 @@ def flight():
 
 
 def plot():
-    """A name in each place that takes one."""
+    """Return a plot with a hostile name in each place."""
     x = np.linspace(0.0, 1.0, 20)
     marks = (Line(x, x, HOSTILE), Line(x, x), Band(x, x, x + 1.0, HOSTILE), Level(0.5, HOSTILE))
     texts = {"y_label": HOSTILE, "x_label": HOSTILE, "title": HOSTILE, "note": HOSTILE}
@@ -56,7 +56,7 @@ def table():
 
 
 def pages():
-    """Each page of the report's templates, by name."""
+    """Yield name and text of each page from the report's templates."""
     section = [Section("plot", HOSTILE, plot()), Section("missing", HOSTILE, missing=HOSTILE)]
     words = {"title": HOSTILE, "lead": HOSTILE, "outcome": HOSTILE, "tables": [table(), table()]}
     yield "validation", render("validation.html", section, **words)
@@ -85,7 +85,7 @@ def pages():
 
 
 class Gains:
-    """Gains as the page of `lapwing tune` lists them."""
+    """Gains as listed on the page of `lapwing tune`."""
 
     def __init__(self, description):
         self.description = description
@@ -96,7 +96,7 @@ class Gains:
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory):
-    """Paths of all pages."""
+    """Return the paths of all pages."""
     folder = tmp_path_factory.mktemp("pages")
     paths = [write(flight(), folder / "report.html", view3d=True)]
     paths.append(write([flight(), flight()], folder / "comparison.html", view3d=True))

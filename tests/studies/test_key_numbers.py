@@ -17,7 +17,7 @@ TICKS, RATE = 400, 100
 
 
 def flight():
-    """0.3 m east and 0.4 m north of its reference."""
+    """Return a flight 0.3 m east and 0.4 m north of its reference."""
     position = np.tile((0.3, 0.4, 2.0), (TICKS, 1))
     position[:, 2] += np.arange(TICKS) / RATE
     truth = {
@@ -43,14 +43,14 @@ def flight():
     return result
 
 
-def test_error_is_beyond_published_one():
+def test_error_above_published_value_is_marked():
     error, largest, *_ = key_numbers(flight())
     assert (error.value, error.limit, error.good) == (pytest.approx(0.5), pytest.approx(0.03**0.5), False)
     assert largest.value == pytest.approx(0.5)
     assert largest.good
 
 
-def test_trouble_is_faults_without_phases():
+def test_trouble_lists_faults_without_phases():
     assert [event.kind for event in trouble(flight())] == ["fault"]
 
 
@@ -60,7 +60,7 @@ def test_trouble_names_crash_at_its_time():
     assert [(event.time, event.kind) for event in trouble(crashed)] == [(1.5, "crashed"), (2.0, "fault")]
 
 
-def test_report_names_criteria_of_scene_that_are_not_met(tmp_path):
+def test_report_names_missed_criteria_of_scene(tmp_path):
     values = flight()
     values.origin.scene["success"] = {
         "require": ["max_distance < 0.4", "rmse.x < 1", "outcome in ('landed', 'completed')"]

@@ -1,4 +1,4 @@
-"""A flight step by step is the flight: its messages, and its events."""
+"""Flight in steps: its messages and events equal those of the whole flight."""
 
 import itertools
 
@@ -18,7 +18,7 @@ STEP = 50_000_000  # [ns]
 
 @pytest.fixture(scope="module")
 def steps():
-    """Return the first seconds of a mission whose services hand over at different times."""
+    """Return the steps of a short mission whose services deliver at different times."""
     setup = resolve(load("hover", {"run.duration": 4.0}))
     graph = BlockDiagram(setup, create_all(setup), PAGE)
     live, result, delayed = LiveFlight(setup), [], []
@@ -39,7 +39,7 @@ def whole():
     return lapwing.fly("hover", {"run.duration": 4.0})
 
 
-def test_steps_are_flight_each_begun_with_last_message_before(steps, whole):
+def test_steps_begin_with_last_message_before_and_form_flight(steps, whole):
     assert len(steps) > 10
     for one, other in itertools.pairwise(steps):
         assert one.times("ground_truth")[-1] == other.times("ground_truth")[0]

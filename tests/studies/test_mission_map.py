@@ -15,7 +15,7 @@ TICKS, RATE = 101, 10
 
 
 def flight(terrain=None):
-    """10 m east in 10 s, in wind from the west."""
+    """Return a flight of 10 m east in 10 s, in wind from the west."""
     t = np.arange(TICKS) / RATE
     truth = {
         "pose.position": np.column_stack([t, 0.0 * t, 0.0 * t + 2.0]),
@@ -46,7 +46,7 @@ def test_all_vehicles_of_fleet_are_on_map_by_name():
     assert panel.y_range[1] > 30.0
 
 
-def test_events_that_went_wrong_are_where_vehicle_was():
+def test_faults_are_drawn_at_position_of_vehicle():
     (faults,) = named("fault")
     assert faults.x == pytest.approx([4.0, 5.0])
     assert not named("phase")

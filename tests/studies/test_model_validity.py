@@ -86,7 +86,7 @@ def test_unlimited_motor_current_is_reported(peak, effects, count):
 
 
 @pytest.mark.long
-def test_run_of_papers_mission_names_unlimited_current():
+def test_run_of_paper_mission_names_unlimited_current():
     """Mission of the paper as flown: 311 A, as found by hand from voltages and speeds."""
     flight = lapwing.fly("delivery_paper")
     (warning,) = [event for event in flight.events if event.kind == "warning"]

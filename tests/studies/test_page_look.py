@@ -22,8 +22,8 @@ BLIND = {
     "deuteranopia": [[0.367322, 0.860646, -0.227968], [0.280085, 0.672501, 0.047413], [-0.01182, 0.04294, 0.968881]],
     "protanopia": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
 }
-APART = 0.1  # distance in linear red, green, blue of two colours that can be told apart
-MEAN, WORST = 8.0, 70.0  # of 255: mean difference of pixels, and that of the worst in a hundred; fonts differ
+APART = 0.1  # distance in linear red, green, blue of two distinguishable colours
+MEAN, WORST = 8.0, 70.0  # of 255: mean difference of pixels, and its 99th percentile; fonts differ
 
 
 def linear(colour):
@@ -39,7 +39,7 @@ def contrast(one, other):
 @pytest.mark.parametrize("theme", [LIGHT_THEME, DARK_THEME], ids=["light", "dark"])
 @pytest.mark.parametrize("ground", ["ground", "panel", "differs"])
 @pytest.mark.parametrize("text", ["text", "muted", "link", "good", "bad"])
-def test_text_has_contrast_on_every_ground(theme, ground, text):
+def test_text_has_contrast_on_every_background(theme, ground, text):
     assert contrast(theme[text], theme[ground]) >= READABLE
 
 
@@ -56,7 +56,7 @@ def test_colours_differ_without_red_green_vision(kind, scheme):
 
 @pytest.mark.long
 @pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
-def test_report_looks_as_kept_in_light_dark_and_on_phone():
+def test_report_matches_pictures_in_light_dark_and_on_phone():
     for look, pixels, (page, window) in page_looks.pictures():
         difference = np.abs(pixels.astype(float) - page_looks.reference_picture(look))
         assert difference.mean() < MEAN, look

@@ -26,7 +26,7 @@ ROOT = Path(__file__).parents[2]
 VEHICLE = ROOT / "lapwing/scenes/vehicles/delivery_drone.toml"
 
 
-def test_scene_and_its_vehicle_give_same_card():
+def test_scene_and_its_vehicle_have_same_card():
     assert card(VEHICLE) == card(ROOT / "lapwing/scenes/hover.toml")
 
 
@@ -39,11 +39,11 @@ def test_units_of_card():
     assert rows["maximum tilt"].published == pytest.approx(58.9, abs=0.05)
 
 
-def test_default_models_come_near_paper():
+def test_default_models_are_close_to_paper():
     rows = {row.name: row for row in card(VEHICLE)}
     for name in ("hover time", "maximum payload", "maximum tilt"):
         assert rows[name].computed == pytest.approx(rows[name].published, rel=0.06), name
-    ceiling = rows["ceiling"]  # in the standard atmosphere, which is denser aloft than the paper's law
+    ceiling = rows["ceiling"]  # in the standard atmosphere, which is denser at height than the paper's law
     assert 1.1 < ceiling.computed / ceiling.published < 1.2
 
 
@@ -65,7 +65,7 @@ def test_unknown_target_is_rejected(tmp_path):
 
 
 def airframe_without(tmp_path, *tables):
-    """The delivery drone's file without some of its tables."""
+    """Return the path of the delivery drone's file without some tables."""
     parts = re.split(r"(?m)^(?=\[)", VEHICLE.read_text())
     path = tmp_path / "vehicle.toml"
     path.write_text("".join(part for part in parts if not part.startswith(tuple(f"[{name}" for name in tables))))
@@ -95,7 +95,7 @@ QUADRATIC = "\n[effects.rotor_quadratic]\nthrust_constant = 4.0e-4\ntorque_const
 
 
 def scene_with_constants(tmp_path, vehicle):
-    """The hover scene under `rotor_quadratic`, which knows no propeller."""
+    """Return the path of the hover scene with `rotor_quadratic`, which needs no propeller."""
     text = (ROOT / "lapwing/scenes/hover.toml").read_text().replace("[effects.rotor_thrust]", QUADRATIC)
     path = tmp_path / "scene.toml"
     path.write_text(text.replace('"delivery_drone"', f'"{vehicle}"'))
@@ -103,7 +103,7 @@ def scene_with_constants(tmp_path, vehicle):
 
 
 @pytest.mark.parametrize("tables", [("propeller",), ()], ids=["without a propeller", "with both"])
-def test_card_and_autopilot_go_by_rotors_that_are_in_force(tmp_path, tables):
+def test_card_and_autopilot_use_active_rotor_model(tmp_path, tables):
     scene = scene_with_constants(tmp_path, airframe_without(tmp_path, *tables))
     nominal = known_airframe(load(scene))
     assert nominal.motor.thrust_coefficient == 4.0e-4
@@ -128,7 +128,7 @@ def test_airframe_without_rotor_model_is_rejected(tmp_path):
 
 
 def test_hexacopter_without_rotor_equals_linear_programming():
-    """All thrusts up to the highest, torques of roll, pitch and yaw 0: the autopilot's least squares come near it."""
+    """Thrusts are limited and torques are zero; the autopilot's least squares is close to the optimum."""
     rows = {row.name: row for row in card(ROOT / "lapwing/scenes/vehicles/hexacopter.toml")}
     nominal = known_airframe(load("hexacopter"))
     B, whole = rotor_effectiveness(nominal), rows["thrust over weight"].computed
@@ -147,8 +147,8 @@ def test_four_rotors_cannot_lose_one():
     assert (row.computed, row.reason) == (None, "the 4 rotors cannot lose one")
 
 
-def test_torque_below_that_of_ideal_rotors_gives_no_power():
-    """The flights of the Crazyflie do not determine its torque constant, which predicts them best at a tenth."""
+def test_torque_below_ideal_rotors_has_no_power():
+    """The flights of the Crazyflie do not determine its torque constant; a tenth of it predicts them best."""
     rows = {row.name: row for row in card(Path("crazyflie_21"))}
     thrust = 0.25 * 0.034 * 9.80665
     shaft = 9.0e-12 * (thrust / 1.75e-8) ** 1.5

@@ -66,7 +66,7 @@ METADATA = {
 
 
 def rotation(roll, pitch, yaw):
-    """Quaternion of yaw, then pitch, then roll about the rotated axes, from a textbook formula."""
+    """Return the quaternion of yaw, then pitch, then roll about rotated axes, from a textbook formula."""
     (cr, sr), (cp, sp), (cy, sy) = ((math.cos(a / 2), math.sin(a / 2)) for a in (roll, pitch, yaw))
     return Quaternion(
         x=sr * cp * cy - cr * sp * sy,
@@ -77,7 +77,7 @@ def rotation(roll, pitch, yaw):
 
 
 def messages(std=0.05, rotors=4, reference=True, east=0.0):
-    """Topic and message, tick by tick: a circle whose angles swing; the motors are armed from 1 s on."""
+    """Yield topic and message of each tick: a circle with oscillating angles, motors armed from 1 s on."""
     for tick in range(int(RATE * SECONDS) + 1):
         t = tick / RATE
         stamp = header(tick * 1_000_000_000 // RATE, "world")
@@ -200,7 +200,7 @@ def test_plot_contains_flight_data(log, page):
     assert values(x["y"]) == pytest.approx(flight.truth.position[:, 0], abs=2.0 / 65534)
 
 
-def test_axes_over_time_are_linked_and_say_their_unit(page):
+def test_axes_over_time_are_linked_and_have_units(page):
     for name in ("timeline", "position", "attitude", "motors", "estimator", "air"):
         plot = page.plots[name]
         first, *others = plot["timed"]
@@ -259,7 +259,7 @@ def test_reduced_script_keeps_registered_kinds_of_traces():
     assert len(plotly_script.gzip_base64(reduced)) < 700_000
 
 
-def test_script_of_another_build_stays_whole():
+def test_script_of_another_build_is_not_reduced():
     assert plotly_script.remove_unused_traces("Plotly = {}") == "Plotly = {}"
 
 
@@ -330,7 +330,7 @@ def test_paper_of_two_flights_lists_keys_that_differ(log):
     assert not any(name == "scenes differ in" for name, _ in cover(flights[:1]).facts)
 
 
-def test_pages_hold_plots_in_order_within_their_height():
+def test_printed_pages_keep_order_of_plots_and_height():
     plots = [paper.Titled(str(k), Plot((), "", height)) for k, height in enumerate((5.0, 5.0, 5.0, 30.0, 1.0))]
     pages = paper._paginate(plots)
     assert [titled for page in pages for titled in page] == plots
@@ -373,12 +373,12 @@ def test_script_is_found_in_package_without_other_files(tmp_path, monkeypatch):
     assert plotly_script.script() == "Plotly = {}"
 
 
-def test_another_ending_is_refused(log, tmp_path):
+def test_other_file_endings_are_rejected(log, tmp_path):
     with pytest.raises(ValueError, match=r"circle\.txt: expected a name that ends in \.html, \.pdf or \.png"):
         write(FlightData.read(log), tmp_path / "circle.txt")
 
 
-def test_two_flights_lie_over_each_other(log, tmp_path):
+def test_two_flights_are_overlaid(log, tmp_path):
     other = record(tmp_path / "weak.mcap", messages(rotors=0))
     page = Page(write([FlightData.read(log), FlightData.read(other)], tmp_path / "both.html"))
     names = [trace["name"] for trace in page.plots["position"]["data"]]
@@ -460,7 +460,7 @@ CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser") or shuti
 
 @pytest.mark.long
 @pytest.mark.skipif(CHROMIUM is None, reason="needs Chromium")
-def test_browser_draws_page_without_complaint(log, tmp_path):
+def test_browser_draws_page_without_error(log, tmp_path):
     page = report(log)
     text = page.read_text(encoding="utf-8")
     listen = 'window.addEventListener("error", (e) => document.body.setAttribute("complaint", e.message));'
@@ -495,7 +495,7 @@ def test_summary_equals_log(log, page):
     assert any("a circle <by> formula" in text for text in page.texts)  # escaped, not parsed as an element
 
 
-def test_armed_samples_alone_count(log):
+def test_only_armed_samples_count(log):
     assert FlightData.read(log).armed.sum() == RATE * (SECONDS - 1.0) + 1
     assert all(len(e) == FlightData.read(log).armed.sum() for e in FlightData.read(log).errors.values())
 
@@ -504,14 +504,14 @@ def test_phases_follow_one_another(log):
     assert phases(FlightData.read(log)) == [("climb", 0.0, 3.0), ("hover", 3.0, pytest.approx(SECONDS))]
 
 
-def test_coefficients_are_those_of_propeller(log):
+def test_coefficients_equal_those_of_propeller(log):
     flight = FlightData.read(log)
     speed = flight.truth.rotor_speed[:, 0]
     assert propulsion.coefficient(speed, flight.truth.rotor_thrust[:, 0], 2) == pytest.approx(THRUST)
     assert propulsion.coefficient(speed, flight.truth.rotor_torque[:, 0], 2) == pytest.approx(TORQUE)
 
 
-def test_rotation_vectors_are_those_of_scipy():
+def test_rotation_vectors_equal_those_of_scipy():
     a, b = (Rotation.random(100, random_state=seed).as_quat() for seed in (1, 2))
     b[:50] *= -1.0  # the same attitudes
     expected = (Rotation.from_quat(a).inv() * Rotation.from_quat(b)).as_rotvec()
@@ -520,7 +520,7 @@ def test_rotation_vectors_are_those_of_scipy():
     assert not rotation_vector(product(conjugate(start), start)).any()
 
 
-def test_estimate_errors_and_refusals(log):
+def test_estimate_errors_and_rejections(log):
     error = estimator.errors(FlightData.read(log))
     expected = np.zeros(9)
     expected[0] = ESTIMATE_ERROR
@@ -529,7 +529,7 @@ def test_estimate_errors_and_refusals(log):
 
 
 def test_attitude_error_is_in_body_frame(tmp_path):
-    """Truth yawed by 90 degrees; an estimate rolled 0.1 rad further about the body's x axis errs by (0.1, 0, 0)."""
+    """Truth yawed by 90 degrees; an estimate with 0.1 rad more roll about body x has the error (0.1, 0, 0)."""
     c = math.cos(math.pi / 4)
     true, roll = Quaternion(x=0.0, y=0.0, z=c, w=c), (math.sin(0.05), math.cos(0.05))
     estimated = Quaternion(x=c * roll[0], y=c * roll[0], z=c * roll[1], w=c * roll[1])  # true * roll, by hand
@@ -543,7 +543,7 @@ def test_attitude_error_is_in_body_frame(tmp_path):
     assert error[:, 6:] == pytest.approx(np.array([[0.1, 0.0, 0.0]] * 2), abs=1e-12)
 
 
-def test_truncated_log_gives_report_too(log, tmp_path):
+def test_truncated_log_has_report(log, tmp_path):
     cut = tmp_path / "cut.mcap"
     cut.write_bytes(log.read_bytes()[: log.stat().st_size // 2])
     page = Page(report(cut))
@@ -585,7 +585,7 @@ def test_non_log_file_is_rejected(tmp_path, content, complaint):
     assert not path.with_suffix(".html").exists()
 
 
-def test_log_without_flight_is_refused(tmp_path):
+def test_log_without_flight_is_rejected(tmp_path):
     path = record(tmp_path / "imu.mcap", [("imu", Imu(header(0, "drone1")))])
     with pytest.raises(ValueError, match="no flight in this log"):
         report(path)

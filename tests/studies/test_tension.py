@@ -23,7 +23,7 @@ def multipliers(r, v, force):
     return result[9:] * np.linalg.norm(d, axis=1)
 
 
-def test_tension_is_that_of_lagrange_multipliers():
+def test_tension_equals_lagrange_multipliers():
     rng = np.random.default_rng(3)
     for _ in range(5):
         q = rng.normal(size=(2, 3))
@@ -62,7 +62,7 @@ def test_pushing_link_event_has_name_time_and_force():
     assert flight(hover(np.zeros(100))).events == []
 
 
-def test_where_push_begins_and_ends():
+def test_push_has_begin_end_and_largest_force():
     t = np.arange(5.0)
     assert pushes(t, np.array([3.0, 1.0, -1.0, -2.0, 4.0])) == [(1.5, 3.0, 2.0)]
     assert pushes(t, np.ones(5)) == []

@@ -7,7 +7,7 @@ from scipy.spatial.transform import Rotation
 from lapwing.studies import tracking
 
 
-def test_roll_pitch_yaw_are_scipys():
+def test_roll_pitch_yaw_equal_scipy():
     some = Rotation.random(100, random_state=np.random.default_rng(3))
     result, expected = tracking.roll_pitch_yaw(some.as_quat()), some.as_euler("ZYX")[:, ::-1]
     assert result[:, :2] == pytest.approx(expected[:, :2], abs=1e-7)  # asin is steep near 90 degrees
@@ -25,7 +25,7 @@ def test_angle_differences_are_wrapped():
     assert len(tracking.errors(reference, np.zeros((3, 3)), attitude, np.array([True, False, True]))) == 2
 
 
-def test_errors_have_bits_of_numpys():
+def test_errors_are_bit_for_bit_those_of_numpy():
     random = np.random.default_rng(5)
     reference, position, attitude = (random.normal(size=(500, k)) * 9.0 for k in (6, 3, 3))
     armed = random.random(500) > 0.3

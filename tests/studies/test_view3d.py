@@ -66,7 +66,7 @@ def test_arrows_point_along_their_vector(direction):
     assert tip == pytest.approx(np.array(direction) / np.linalg.norm(direction), abs=2e-3)
 
 
-def test_rotors_turn_in_their_own_direction():
+def test_each_rotor_turns_in_its_direction():
     values = flight()
     moved = motion(values)
     assert [tuple(rotor.hub) for rotor in moved.bodies[0].rotors] == [tuple(hub) for hub in HUBS]
@@ -83,7 +83,7 @@ def test_rotors_turn_in_their_own_direction():
         assert np.arctan2(y, x) == pytest.approx(sign, abs=step)
 
 
-def test_thrust_arrows_stand_on_hubs_and_have_their_lengths():
+def test_thrust_arrows_start_at_hubs_with_expected_lengths():
     rotors, scene = motion(flight()).bodies[0].rotors, Recorder()
     Rotors(scene, "/body", rotors, "#0072B2", 0.1).set_thrusts(np.array([1.0, 2.0, 0.0, -3.0]))
     arrows = scene.nodes["/body/thrusts"].vertices.reshape(4, -1, 3)
@@ -147,7 +147,7 @@ def test_airframe_model_has_feet_and_payload_volume():
 
 
 def fleet():
-    """Two vehicles, the second 4 m north of the first."""
+    """Return two vehicles, the second 4 m north of the first."""
     first = flight()
     truth = {name: first.truth[name] for name in first.truth.fields}
     truth["pose.position"] = first.truth.position + np.array([0.0, 4.0, 0.0])
@@ -163,7 +163,7 @@ OFF = {**AIRFRAME, "mass": {"payload": 0.0, "centre": [0.1, 0.0, 0.2]}}
 
 
 def slung():
-    """A load 1.5 m below the hook: on a slack cable for the first half, pulled for the second."""
+    """Return a flight with a load 1.5 m below the hook, on a slack cable first, on a taut one in the second half."""
     place = np.zeros((TICKS, 1, 3))
     place[:, 0, 2] = T - 0.3 - 1.5
     force = np.where((np.arange(TICKS) < TICKS // 2)[:, None, None], 0.0, [[[0.0, 0.0, 4.0]]])
@@ -331,7 +331,7 @@ def test_vehicle_without_shape_has_its_axes():
         ("unload", 8, 0, 0),
     ],
 )
-def test_every_kind_of_scene_is_drawn_in_its_own_shape(scene, bodies, rotors, links):
+def test_every_kind_of_scene_has_its_shape(scene, bodies, rotors, links):
     recorded = FlightData.read(sample_file(scene))  # the samples carry no run configuration
     views = {name: recorded.topic(name) for name in recorded.topics}
     result = motion(FlightData(views, Origin.of_setup(resolve(load(scene)))))
@@ -346,7 +346,7 @@ def page(tmp_path_factory):
 
 
 def embedded(page):
-    """The page of the 3D view within a report."""
+    """Return the page of the 3D view within a report."""
     text = page.read_text(encoding="utf-8").partition('id="space"')[2]
     return json.loads(re.search(r'<script type="application/json">(".*?")</script>', text)[1])
 
@@ -403,7 +403,7 @@ def test_browser_follows_vehicle_and_seeks(tmp_path, page):
 
 @pytest.mark.long
 @pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
-def test_browser_ties_view_to_plots(tmp_path, page):
+def test_browser_links_view_to_plots(tmp_path, page):
     with chromium.Browser(page, tmp_path / "profile") as browser:
         played, sought, cursor = browser.run(
             """

@@ -17,7 +17,7 @@ AHEAD, ASIDE = PATH + np.array([5.0, 0.0, 0.0]), PATH + np.array([0.0, 3.0, 0.0]
 
 
 def shown(reference, estimate, ghost=False):
-    """Nodes of a vehicle, and the handles of its ghosts' meshes at each of TIMES."""
+    """Return the nodes of a vehicle and the handles of its ghost meshes at each of TIMES."""
     values = flight(
         setpoint={"position": reference, "yaw": 0.5},
         actuators={"attitude_reference": (0.1, 0.0, 0.5), "armed": np.ones(TICKS, bool)},
@@ -46,7 +46,7 @@ def test_quaternion_of_angles_turns_about_z_y_x(angles):
     assert rotate(from_angles(np.array([angles]))[0], vector) == pytest.approx(z @ y @ x @ vector, abs=5e-3)
 
 
-def test_ghosts_stand_where_reference_and_estimate_are():
+def test_ghosts_are_at_reference_and_estimate():
     _, _, result = shown(AHEAD, ASIDE)
     for time, ghosts in zip(TIMES, result, strict=True):
         assert ghosts["reference"]["position"] == pytest.approx((5.0, 0.0, time), abs=1e-3)
@@ -91,7 +91,7 @@ def test_ellipsoid_of_estimate_is_not_turned_with_its_ghost():
     assert not hasattr(scene.nodes["/0 drone1/estimate"], "position")
 
 
-def test_second_flight_is_translucent_body_without_ghosts_of_its_own():
+def test_second_flight_is_translucent_body_without_ghosts():
     scene, _, result = shown(AHEAD, ASIDE, ghost=True)
     assert result == [{}] * len(TIMES)
     bodies = [node for name, node in scene.nodes.items() if "/solid " in name]

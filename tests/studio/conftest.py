@@ -69,7 +69,7 @@ class Studio:
 
 @pytest.fixture(scope="module")
 def start():
-    """Yield a function that starts a studio in a folder; end it after the tests of the file."""
+    """Yield a function that starts a studio in a folder; end the studio after the tests of the file."""
     running = []
 
     def begin(folder, *options):

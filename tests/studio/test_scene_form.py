@@ -42,7 +42,7 @@ def test_segments_of_phases_have_fields_of_their_kind(schema):
 
 
 @pytest.mark.parametrize("scene", sorted(path.stem for path in SHIPPED.glob("*.toml")))
-def test_every_field_is_key_that_its_scene_takes(scene, schema):
+def test_every_field_is_valid_key_of_its_scene(scene, schema):
     by_key = fields(scene, schema)
     assert len(by_key) > 20
     set_fields = {key: field for key, field in by_key.items() if field.text}
@@ -63,7 +63,7 @@ def test_tables_that_scene_lacks_can_be_added(schema):
     assert "effects.random_wind_force.mean" in by_key
 
 
-def test_unchanged_texts_are_no_changes(schema):
+def test_unchanged_texts_add_no_overrides(schema):
     by_key = fields("delivery_mission", schema)
     assert changes(by_key.values(), {key: field.text for key, field in by_key.items()}, ()) == ([], {})
 
@@ -104,7 +104,7 @@ def test_texts_become_values_of_field(schema):
         ("run.duration", "1\nx = 2", "got 1\nx = 2; expected a number"),
     ],
 )
-def test_text_of_another_kind_is_fault(schema, key, text, message):
+def test_text_of_wrong_type_is_fault(schema, key, text, message):
     by_key = fields("delivery_mission", schema)
     assert changes(by_key.values(), {key: text}, ()) == ([], {key: message})
 

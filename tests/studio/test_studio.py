@@ -77,7 +77,7 @@ def test_uploads_and_large_requests_are_rejected(studio):
         assert connection.recv(1 << 12).startswith(b"HTTP/1.1 413 ")
 
 
-def test_files_outside_of_folder_are_not_served(studio, folder):
+def test_files_outside_folder_are_not_served(studio, folder):
     for path in (
         "flights/..%2fmine.toml",
         "flights/..%2Fmine.toml/report",
@@ -136,7 +136,7 @@ def test_faulty_form_is_returned_with_fault(studio):
 
 @pytest.fixture(scope="module")
 def flown(studio):
-    """Pages of two runs of hover, the second with another seed and height."""
+    """Return the pages of two runs of hover, the second with another seed and height."""
     pages = []
     for number, changed in enumerate(({}, {"run.seed": "2", "trajectory.phase.0.z.to": "1.5"}), 1):
         status, _, headers = studio.request("scenes/hover/run", {**QUICK, **changed})

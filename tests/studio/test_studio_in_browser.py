@@ -1,4 +1,4 @@
-"""`lapwing studio` as a user sees it: pick, change, run, look, compare, in headless Chromium."""
+"""`lapwing studio` in headless Chromium: select a scene, change it, run it, view it, compare flights."""
 
 import time
 import urllib.error
@@ -34,7 +34,7 @@ const type = (name, text) => {
 
 
 class User:
-    """Moves from page to page, as by links."""
+    """User who follows links from page to page."""
 
     def __init__(self, browser):
         self._browser = browser
@@ -59,13 +59,13 @@ class User:
                     'return document.readyState === "complete" ? location.href : "";'
                 ):
                     return
-            except chromium.BrowserError:  # the page went away under the script
+            except chromium.BrowserError:  # the page changed during the script
                 continue
         raise AssertionError(f"no page {part}")
 
 
 def fly(user, changed):
-    """Pick hover, change it, fly it; returns the command line that was shown."""
+    """Select hover, change it and fly it; return the displayed command line."""
     user.do("await until(() => one('a[href$=\"scenes/hover\"]'));")
     user.go("one('a[href$=\"scenes/hover\"]').click()", "scenes/hover")
     for name, text in changed.items():
@@ -84,7 +84,7 @@ def fly(user, changed):
     return command
 
 
-def test_user_picks_changes_runs_looks_and_compares(start, tmp_path):
+def test_user_selects_changes_runs_views_and_compares(start, tmp_path):
     studio = start(tmp_path)
     with chromium.Browser(studio.address, tmp_path / "profile", (1280, 900)) as browser:
         user = User(browser)
@@ -104,7 +104,7 @@ def test_user_picks_changes_runs_looks_and_compares(start, tmp_path):
         assert any(text.startswith("run.seed") and "17" in text for text in differs)
         browser.call("Emulation.setDeviceMetricsOverride", width=390, height=800, deviceScaleFactor=1, mobile=False)
         widths = user.do("return [one('.scroll').scrollWidth, one('.scroll').clientWidth];")
-        assert widths[0] <= widths[1]  # both flights are in the window of a phone
+        assert widths[0] <= widths[1]  # both flights fit in the window of a phone
         browser.call("Emulation.setDeviceMetricsOverride", width=1280, height=900, deviceScaleFactor=1, mobile=False)
         user.go("one('.brand').click()", studio.address)
         cards = user.do(
@@ -117,7 +117,7 @@ def test_user_picks_changes_runs_looks_and_compares(start, tmp_path):
         )
         assert cards == ["Compare 2 flights", False]
         user.go("one('#compare').click()", "compare?")
-        user.go(f"location.href = {frame!r}", "/report")  # the report has a sandbox of its own
+        user.go(f"location.href = {frame!r}", "/report")  # the report has a separate sandbox
         drawn = user.do(
             """
             one("#position").scrollIntoView();

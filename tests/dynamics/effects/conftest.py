@@ -40,7 +40,7 @@ def situation():
 
 @pytest.fixture(scope="session")
 def rotors():
-    """Build Rotors with given loads, accelerations, currents and voltages; the same for all four."""
+    """Build Rotors: four equal loads, accelerations, currents and voltages."""
 
     def build(thrust=25.0, torque=1.0, acceleration=(0.0,) * 4, current=10.0, voltage=32.0):
         return Rotors(

@@ -1,4 +1,4 @@
-"""Small things that the tests of effects share."""
+"""Helpers shared by the tests of effects."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""Rotors with axes of their own: by hand, by an independent sum over rotors, and seen from a turned body frame."""
+"""Tilted rotors against hand calculations, an independent sum over rotors, and a rotated body frame."""
 
 from dataclasses import dataclass
 
@@ -26,7 +26,7 @@ TABLE = {"advance": [-0.2, 0.0, 0.2, 0.4], "angle_deg": [0.0, 90.0], "diameter":
 
 
 @dataclass
-class Flown:
+class FlightLoads:
     """Loads on an airborne vehicle, in body coordinates."""
 
     force: np.ndarray
@@ -41,21 +41,21 @@ def airframe(drone, axes, positions=None):
     return drone.model_copy(update={"rotors": drone.rotors.model_copy(update=rotors)})
 
 
-def flown(frame, tables, turn=(0.2, -0.3, 0.5), velocity=(4.0, -2.0, 1.5), omega=RATES):
-    """The loads on a vehicle with rotors at SPEED under VOLTAGE; `turn` is the rotation vector body to world."""
+def loads_in_flight(frame, tables, turn=(0.2, -0.3, 0.5), velocity=(4.0, -2.0, 1.5), omega=RATES):
+    """Return the loads on a vehicle with rotors at SPEED under VOLTAGE; `turn` is the rotation vector body to world."""
     p = multirotor.parameters(frame, effects.from_scene(tables, frame))
     R = Rotation.from_rotvec(turn)
     attitude = Quaternion(*map(float, R.as_quat(scalar_first=True)))
     motion = Motion((0.0, 0.0, 50.0), attitude, tuple(velocity), tuple(map(float, omega)), SPEED)
     drive = MultirotorDrive(p, p.body, multirotor.initial_state(p).memory, VOLTAGE)
     _, rotors, force, torque = python_function(evaluate)(drive, 0.0, motion)
-    return Flown(R.inv().apply(force), np.array(torque), *map(np.array, rotors[:3]))
+    return FlightLoads(R.inv().apply(force), np.array(torque), *map(np.array, rotors[:3]))
 
 
 def test_static_thrust_and_moments_by_hand(drone):
     """F = sum T a, M = sum r x T a + s Q a: reaction torque and thrust lie along the axis."""
     frame = airframe(drone, AXES)
-    result = flown(frame, {"rotor_thrust": {}}, velocity=(0, 0, 0), omega=(0, 0, 0))
+    result = loads_in_flight(frame, {"rotor_thrust": {}}, velocity=(0, 0, 0), omega=(0, 0, 0))
     (e,) = effects.from_scene({"rotor_thrust": {}}, frame)
     force, torque = np.zeros(3), np.zeros(3)
     spins = drone.rotors.spin_direction
@@ -83,13 +83,13 @@ def test_static_thrust_and_moments_by_hand(drone):
     ids=lambda tables: " ".join(tables),
 )
 def test_vehicle_in_turned_body_frame_flies_same(drone, tables):
-    """All axes tilted alike, and the hubs turned with them, are the plain vehicle in other coordinates."""
+    """Tilting all axes and hubs alike describes the plain vehicle in other coordinates."""
     hubs = [(x, y, 0.1) for x, y, _ in drone.rotors.position]
     Q = Rotation.from_rotvec([0.3, -0.4, 0.2])  # of the vehicle in its body frame
     turn = Rotation.from_rotvec([0.2, -0.3, 0.5])
-    plain = flown(airframe(drone, (), hubs), tables, turn.as_rotvec())
+    plain = loads_in_flight(airframe(drone, (), hubs), tables, turn.as_rotvec())
     tilted = airframe(drone, [Q.apply((0, 0, 1))] * 4, Q.apply(hubs).tolist())
-    result = flown(tilted, tables, (turn * Q.inv()).as_rotvec(), omega=Q.apply(RATES))
+    result = loads_in_flight(tilted, tables, (turn * Q.inv()).as_rotvec(), omega=Q.apply(RATES))
     assert Q.inv().apply(result.force) == pytest.approx(plain.force, rel=1e-10, abs=1e-10)
     assert Q.inv().apply(result.torque) == pytest.approx(plain.torque, rel=1e-10, abs=1e-10)
     assert result.thrust == pytest.approx(plain.thrust, rel=1e-12)
@@ -97,10 +97,10 @@ def test_vehicle_in_turned_body_frame_flies_same(drone, tables):
 
 
 def test_gyroscopic_torque_conserves_angular_momentum(drone):
-    """-dL/dt of L = -J sum s w a, carried along by a body that turns: by differences of L in the world."""
+    """The torque is -dL/dt of L = -J sum s w a in a rotating body; the reference uses differences of L in the world."""
     frame = airframe(drone, AXES)
-    with_it = flown(frame, {"rotor_thrust": {}, "gyroscopic_torque": {}})
-    without = flown(frame, {"rotor_thrust": {}})
+    with_it = loads_in_flight(frame, {"rotor_thrust": {}, "gyroscopic_torque": {}})
+    without = loads_in_flight(frame, {"rotor_thrust": {}})
     axes = np.array(frame.rotors.tilted_axis)
     lag = multirotor.parameters(frame).layout
     speeding = lag.lag_rate * (lag.speed_per_volt * np.array(VOLTAGE) - SPEED)
@@ -113,7 +113,7 @@ def test_gyroscopic_torque_conserves_angular_momentum(drone):
     assert with_it.torque - without.torque == pytest.approx(-rate, rel=1e-6)
 
 
-def test_axes_along_z_are_none(drone):
+def test_axes_along_z_need_no_tilt(drone):
     assert airframe(drone, [(0.0, 0.0, 2.0)] * 4).rotors.tilted_axis == ()
 
 
@@ -126,7 +126,7 @@ def test_axes_along_z_are_none(drone):
         ([(1, 0, 0)] + [(0, 0, 1)] * 3, "rotors.axis.0: expected a direction that points up"),
     ],
 )
-def test_refused(drone, axis, message):
+def test_invalid_axes_are_rejected(drone, axis, message):
     with pytest.raises(ValidationError) as caught:
         Airframe.model_validate(
             drone.model_dump(exclude_none=True) | {"rotors": drone.rotors.model_dump() | {"axis": axis}}

@@ -59,8 +59,8 @@ def test_rotor_at_rest_has_no_loads(drone, situation):
     assert total == ((0.0,) * 4, (0.0,) * 4)
 
 
-def test_rolling_and_pitching_are_damped_by_each_hubs_own_speed(drone, situation):
-    """Each rotor at (x, y) in pure turning gets the loads of a climb at omega_x y - omega_y x."""
+def test_rolling_and_pitching_are_damped_by_hub_speeds(drone, situation):
+    """In pure rotation each rotor at (x, y) has the loads of a climb at omega_x y - omega_y x."""
     omega = (0.4, -0.3, 0.8)
     _, turning = both(drone, situation(omega=omega))
     for k, (x, y, _) in enumerate(drone.rotors.position):

@@ -16,7 +16,7 @@ def test_published_open_circuit_curve():
     assert open_circuit_voltage(0.5) == pytest.approx(3.685 + 0.1078 - 0.02945 + 0.0400125, abs=1e-6)
 
 
-def test_empties_by_charge_drawn(drone, situation, rotors):
+def test_charge_falls_by_charge_drawn(drone, situation, rotors):
     """Charge lost times capacity is the integral of power over voltage."""
     e, memory = make(drone), make(drone).initial_discrete_state()
     drawn = 0.0
@@ -28,7 +28,7 @@ def test_empties_by_charge_drawn(drone, situation, rotors):
     assert memory[2] == pytest.approx(4 * 320.0 / memory[1], rel=1e-3)
 
 
-def test_sags_with_load(drone, situation, rotors):
+def test_voltage_sags_with_load(drone, situation, rotors):
     e = make(drone)
     light = discharge.py_func(e, e.initial_discrete_state(), situation(), rotors(current=1.0), (0, 0), 0, 0.004)
     heavy = discharge.py_func(e, e.initial_discrete_state(), situation(), rotors(current=20.0), (0, 0), 0, 0.004)
@@ -39,14 +39,14 @@ def test_motor_voltage_is_limited_by_battery(drone):
     assert battery.py_func(make(drone), (0.5, 40.0, 0.0), (44.4, 30.0, 0.0, 41.0)) == (40.0, 30.0, 0.0, 40.0)
 
 
-def test_cuts_off_for_good(drone, situation, rotors):
+def test_cutoff_is_permanent(drone, situation, rotors):
     e = make(drone, initial_charge=0.02, cutoff_voltage=3.3)
     memory = discharge.py_func(e, e.initial_discrete_state(), situation(), rotors(current=20.0), (0, 0), 0, 1.0)
     assert memory[1] == 0.0
     assert discharge.py_func(e, memory, situation(), rotors(current=0.0), (0, 0), 1, 1.0)[1] == 0.0
 
 
-def test_charge_out_of_range(drone):
+def test_charge_out_of_range_is_rejected(drone):
     with pytest.raises(
         ValueError, match=r"effects.battery.initial_charge: expected a number above 0 and at most 1, got 1.5"
     ):

@@ -1,4 +1,4 @@
-"""Against the closed forms of a step of current, the paper's time constants, and a balance of heat."""
+"""Thevenin battery against the closed form of a current step, the paper's time constants and a heat balance."""
 
 import math
 
@@ -19,8 +19,8 @@ def make(drone, around=None, **table):
     return e
 
 
-def flown(e, memory, situation, rotors, current, seconds, interval=0.1):
-    """Memory after drawing a constant current [A] from the pack."""
+def after_current(e, memory, situation, rotors, current, seconds, interval=0.1):
+    """Return the discrete state after the pack has supplied a constant current [A]."""
     for tick in range(round(seconds / interval)):
         requested = rotors(current=0.25 * current, voltage=memory[1])
         memory = discharge.py_func(e, memory, situation(), requested, (0, 0), tick, interval)
@@ -30,19 +30,19 @@ def flown(e, memory, situation, rotors, current, seconds, interval=0.1):
 def test_voltage_after_current_step_is_two_exponentials(drone, situation, rotors):
     """At 40 A for 20 s, and back: the published ratios 0.627 and 0.669 and times 32.9 and 223 s."""
     e = make(drone, initial_charge=0.6, **COLD)
-    loaded = flown(e, e.initial_discrete_state(), situation, rotors, 40.0, 20.0)
+    loaded = after_current(e, e.initial_discrete_state(), situation, rotors, 40.0, 20.0)
     sag = OHMIC * 40.0 * (1.0 + 0.627 * (1 - math.exp(-20 / 32.9)) + 0.669 * (1 - math.exp(-20 / 223.0)))
     rest = e._replace(initial_charge=loaded[0]).initial_discrete_state()[1]
     assert rest - loaded[1] == pytest.approx(sag, rel=1e-6)
-    rested = flown(e, loaded, situation, rotors, 0.0, 60.0)
+    rested = after_current(e, loaded, situation, rotors, 0.0, 60.0)
     left = 0.627 * (1 - math.exp(-20 / 32.9)) * math.exp(-60 / 32.9)
     left += 0.669 * (1 - math.exp(-20 / 223.0)) * math.exp(-60 / 223.0)
     assert rest - rested[1] == pytest.approx(OHMIC * 40.0 * left, rel=1e-6)
 
 
-def test_interval_does_not_matter(drone, situation, rotors):
+def test_result_is_independent_of_interval(drone, situation, rotors):
     e = make(drone, initial_charge=0.6, **COLD)
-    fine, coarse = (flown(e, e.initial_discrete_state(), situation, rotors, 40.0, 20.0, h) for h in (0.05, 1.0))
+    fine, coarse = (after_current(e, e.initial_discrete_state(), situation, rotors, 40.0, 20.0, h) for h in (0.05, 1.0))
     assert coarse[:2] == pytest.approx(fine[:2], rel=1e-9)
 
 
@@ -52,7 +52,7 @@ def test_temperature_converges_to_thermal_balance(drone, situation, rotors):
     e = make(drone, air, initial_charge=1.0, activation=0.0, transient_resistance=[0.0, 0.0], heat_capacity=3000.0)
     kelvin = 288.15 + 10.0 - 0.0065 * air.home.height
     assert e.initial_discrete_state()[3] == pytest.approx(kelvin, abs=0.01)
-    memory = flown(e, e.initial_discrete_state(), situation, rotors, 40.0, 300.0, 1.0)
+    memory = after_current(e, e.initial_discrete_state(), situation, rotors, 40.0, 300.0, 1.0)
     rise = OHMIC * 40.0**2 * 1800.0 / 3000.0 * (1.0 - math.exp(-300.0 / 1800.0))
     assert read.py_func(e, memory)[3] - e.initial_discrete_state()[3] == pytest.approx(rise, rel=1e-9)
 
@@ -61,7 +61,7 @@ def test_cold_pack_has_higher_resistance(drone, situation, rotors):
     """By Arrhenius' law, 20 kJ/mol: at -10 degC about 2.9 times that at 25."""
     for kelvin in (263.15, 298.15):
         e = make(drone, temperature=kelvin, transient_resistance=[0.0, 0.0], heat_capacity=1e6)
-        memory = flown(e, e.initial_discrete_state(), situation, rotors, 20.0, 0.1)
+        memory = after_current(e, e.initial_discrete_state(), situation, rotors, 20.0, 0.1)
         drop = e._replace(initial_charge=memory[0]).initial_discrete_state()[1] - memory[1]
         assert drop / (OHMIC * 20.0) == pytest.approx(math.exp(2400 * (1 / kelvin - 1 / 298.15)), rel=1e-6)
     assert math.exp(2400 * (1 / 263.15 - 1 / 298.15)) == pytest.approx(2.9, abs=0.05)
@@ -69,14 +69,14 @@ def test_cold_pack_has_higher_resistance(drone, situation, rotors):
 
 def test_cutoff_has_hysteresis(drone, situation, rotors):
     e = make(drone, initial_charge=0.1, cutoff_voltage=3.5, restart=3.6, **COLD)
-    memory = flown(e, e.initial_discrete_state(), situation, rotors, 100.0, 0.1)
+    memory = after_current(e, e.initial_discrete_state(), situation, rotors, 100.0, 0.1)
     assert memory[6] == 0.0
     assert battery_thevenin.py_func(e, memory, (30.0,) * 4) == (0.0,) * 4
-    later = flown(e, memory, situation, rotors, 0.0, 300.0, 1.0)
+    later = after_current(e, memory, situation, rotors, 0.0, 300.0, 1.0)
     assert later[6] == 1.0
     assert later[1] > 12 * 3.6
     final = make(drone, initial_charge=0.1, cutoff_voltage=3.5, **COLD)
-    assert flown(final, memory, situation, rotors, 0.0, 300.0, 1.0)[6] == 0.0
+    assert after_current(final, memory, situation, rotors, 0.0, 300.0, 1.0)[6] == 0.0
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_two_batteries_are_rejected(drone):
 
 
 def delivered(drone, situation, rotors, rate, **table):
-    """Charge [A h] at a current of `rate` C until the controllers stop, of 10 A h."""
+    """Return the charge [A h] of 10 A h that the pack delivers at `rate` C until the controllers stop."""
     e = make(drone, cutoff_voltage=3.0, **COLD, **table)
     memory, ticks = e.initial_discrete_state(), 0
     while memory[6] > 0.0 and memory[0] > 0.0:
@@ -113,23 +113,23 @@ def delivered(drone, situation, rotors, rate, **table):
 
 
 @pytest.mark.parametrize("exponent", [1.05, 1.2])
-def test_exponent_gives_peukerts_law(drone, situation, rotors, exponent):
-    """C = C_1 I^(1 - n) of the charge that the battery delivers without the law."""
+def test_exponent_follows_peukerts_law(drone, situation, rotors, exponent):
+    """The delivered charge is C = C_1 I^(1 - n) times the charge without the law."""
     for rate in (2.0, 10.0):
         plain = delivered(drone, situation, rotors, rate)
         expected = plain * rate ** (1.0 - exponent)
         assert delivered(drone, situation, rotors, rate, peukert_exponent=exponent) == pytest.approx(expected, rel=0.02)
 
 
-def test_branches_alone_are_near_peukerts_law(drone, situation, rotors):
-    """Against n = 1.05, usual for lithium polymer: the differences are those of theory.md; 20 C is cut off early."""
+def test_branches_without_exponent_are_near_peukerts_law(drone, situation, rotors):
+    """Reference: n = 1.05, usual for lithium polymer. theory.md lists the differences; 20 C is cut off early."""
     base = delivered(drone, situation, rotors, 1.0)
     differences = [delivered(drone, situation, rotors, r) / (base * r**-0.05) - 1.0 for r in (2.0, 5.0, 10.0, 20.0)]
     assert differences == pytest.approx([0.033, 0.074, 0.093, -0.215], abs=0.01)
 
 
-def test_currents_below_one_c_take_their_own_charge(drone, situation, rotors):
+def test_exponent_has_no_effect_below_one_c(drone, situation, rotors):
     table = {"initial_charge": 0.6, **COLD}
     plain, law = make(drone, **table), make(drone, peukert_exponent=1.2, **table)
-    states = [flown(e, e.initial_discrete_state(), situation, rotors, 9.0, 5.0) for e in (plain, law)]
+    states = [after_current(e, e.initial_discrete_state(), situation, rotors, 9.0, 5.0) for e in (plain, law)]
     assert states[0] == states[1]

@@ -22,13 +22,13 @@ def test_against_formula_in_world_coordinates(drone, situation, rotors):
     assert drag_world(drone, s, rotors, linear=[0.1, 0.2, 0.3]) == pytest.approx(expected, rel=1e-12)
 
 
-def test_takes_energy_and_vanishes_with_wind(drone, situation, rotors):
+def test_drag_dissipates_energy_and_vanishes_at_wind_speed(drone, situation, rotors):
     s = situation(velocity=(8, -2, 1), turn=(0.2, -0.3, 0.5))
     assert drag_world(drone, s, rotors) @ (8, -2, 1) < 0
     s = situation(velocity=(3, 1, 0), wind=(3, 1, 0))
     assert drag_world(drone, s, rotors) == pytest.approx((0, 0, 0))
 
 
-def test_needs_areas(drone):
+def test_airframe_without_areas_is_rejected(drone):
     with pytest.raises(ValueError, match=r"effects.body_drag: needs the key area"):
         effects.from_scene({"body_drag": {}}, drone.model_copy(update={"drag": None}))

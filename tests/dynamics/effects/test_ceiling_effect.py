@@ -1,4 +1,4 @@
-"""Against the published power ratio under a ceiling, and blades solved by another method."""
+"""Ceiling effect against the published power ratio and an independent solution of the blade equations."""
 
 import math
 
@@ -39,7 +39,7 @@ def test_induced_power_follows_published_ratio(drone, situation, asymmetry):
 
 
 def test_thrust_at_equal_power_follows_published_factor(drone, situation):
-    """Their section V.C: gamma^(2/3) of the thrust for the induced power without a ceiling; 7.4 % at half a radius."""
+    """Section V.C: thrust grows by gamma^(2/3) at the induced power without a ceiling, 7.4 % at half a radius."""
     e = make(drone)
     for radii, published in ((0.5, 1.074), (1.0, 1.020), (2.0, 1.005)):
         thrust, torque = factors(e, below(situation, radii))
@@ -77,7 +77,7 @@ def test_gain_has_no_step_at_edge_or_far_below(drone, situation):
     assert down[-1] == 1.0
 
 
-def test_sleeps_only_out_of_reach(drone, situation):
+def test_effect_sleeps_only_out_of_reach(drone, situation):
     e = make(drone)
     assert low.py_func(e, situation(position=(0, 0, CEILING - e.reach - 0.1)).motion, 0.001)
     assert not low.py_func(e, situation(position=(0, 0, CEILING - e.reach + 0.1)).motion, 0.001)
@@ -86,7 +86,7 @@ def test_sleeps_only_out_of_reach(drone, situation):
 
 
 def test_induced_share_of_torque(drone):
-    """T v_h / (Q w) from static thrust and torque at any speed; at most 1."""
+    """The share is T v_h / (Q w) of static thrust and torque at any speed, at most 1."""
     static = effects.from_scene({"rotor_thrust": {}}, drone)[0]
     flow = math.sqrt(static.thrust_constant / (2.0 * math.pi * R * R))
     assert make(drone).induced == pytest.approx(static.thrust_constant * flow / static.torque_constant)

@@ -1,4 +1,4 @@
-"""The lower rotor of a coaxial pair against momentum theory's published factors, by hand, and in flight."""
+"""Lower rotor of a coaxial pair against published factors of momentum theory, hand calculations and a flight."""
 
 import math
 
@@ -19,7 +19,7 @@ GAP = 0.10  # [m]
 
 
 def stacked(drone, aside=0.0, gap=GAP):
-    """Each rotor with a second one above it, which turns the other way."""
+    """Return an airframe with a counter-rotating rotor above each rotor."""
     r = drone.rotors
     hubs = tuple((x + dx, y, z) for x, y, _ in r.position for dx, z in ((0.0, 0.0), (aside, gap)))
     spins = tuple(way for spin in r.spin_direction for way in (spin, "cw" if spin == "ccw" else "ccw"))
@@ -27,7 +27,7 @@ def stacked(drone, aside=0.0, gap=GAP):
 
 
 def through(pitch, thrust):
-    """Air through the lower rotor, over what it induces by itself: what its blades tell of its thrust."""
+    """Return the flow through the lower rotor over its induced flow, from the thrust of its blades."""
     return pitch - (pitch - 1.0) * thrust
 
 
@@ -64,7 +64,7 @@ def loads(frame, tables, velocity=(0.0, 0.0, 0.0), speeds=(300.0,) * 8, turn=(0.
 
 
 def test_lower_rotor_loses_thrust_and_upper_does_not(drone):
-    """Thrust and induced power of the lower rotor meet the momentum theory of its disc; its profile power stays."""
+    """Thrust and induced power of the lower rotor follow momentum theory; its profile power is unchanged."""
     frame = stacked(drone)
     plain, drag = loads(frame, {"rotor_thrust": {}})
     thrust, torque = loads(frame, {"rotor_thrust": {}, "coaxial_interference": {}})
@@ -76,7 +76,7 @@ def test_lower_rotor_loses_thrust_and_upper_does_not(drone):
     area, rho, v = math.pi * e.radius**2, 1.225, e.flow * 300.0
     u = through(e.pitch, t) * v
     w = (thrust[0] + 2.0 * rho * area * v * v) / (rho * area * u)  # far below: momentum
-    power = 0.5 * rho * area * u * w * w - 2.0 * rho * area * v**3  # what its disc adds to the flow: energy
+    power = 0.5 * rho * area * u * w * w - 2.0 * rho * area * v**3  # power of its disc: energy
     assert thrust[0] * u == pytest.approx(power, rel=1e-9)
     assert (torque - drag)[0] * 300.0 == pytest.approx(thrust[0] * u - plain[0] * v, rel=1e-9)
 
@@ -97,8 +97,8 @@ def test_fast_flight_carries_wake_away(drone):
 BOTH = {"rotor_thrust": {}, "coaxial_interference": {}}
 
 
-def test_slopes_are_those_of_plant(drone):
-    """Central differences of the plant's own loads over what each rotor would give by itself."""
+def test_slopes_equal_differences_of_plant_loads(drone):
+    """The reference is central differences of the plant's loads over the loads of isolated rotors."""
     frame = stacked(drone)
     e, rotor = effects.from_scene(BOTH, frame)
     slopes, k = e.slopes(), 1.225 * rotor.thrust_constant
@@ -112,7 +112,7 @@ def test_slopes_are_those_of_plant(drone):
         assert np.array(slopes.torque)[:, j] + own == pytest.approx(torque, abs=1e-8)
 
 
-def test_slopes_give_loads_at_equal_rotor_speeds(drone):
+def test_slopes_reproduce_loads_at_equal_rotor_speeds(drone):
     """Euler's theorem: loads are homogeneous in the squares of the speeds."""
     e, _ = effects.from_scene(BOTH, stacked(drone))
     slopes, t = e.slopes(), share(e.pitch, 1.0)
@@ -140,19 +140,19 @@ def test_load_changes_equal_those_of_plant(drone, velocity):
         (stacked, {"dynamic_inflow": {}}, "effects.coaxial_interference: is not made to stand beside effects.dynamic"),
     ],
 )
-def test_refused(drone, frame, tables, message):
+def test_invalid_combinations_are_rejected(drone, frame, tables, message):
     with pytest.raises(ValueError, match=message):
         effects.from_scene({"rotor_thrust": {}, "coaxial_interference": {}, **tables}, frame(drone))
 
 
-def test_goes_with_rotor_thrust(drone):
+def test_effect_without_rotor_thrust_is_rejected(drone):
     with pytest.raises(ValueError, match=r"effects.coaxial_interference: goes with effects\.rotor_thrust"):
         effects.from_scene({"coaxial_interference": {}}, stacked(drone))
 
 
 @pytest.mark.long
 def test_eight_rotors_in_four_pairs_hover_and_land(drone):
-    """Twice the vehicle on twice the rotors; the upper ones carry more, as much as the theory says of their speeds."""
+    """At twice the mass on twice the rotors the upper ones carry more, as theory predicts from their speeds."""
     frame = stacked(drone)
     rotors = {"position": [list(p) for p in frame.rotors.position], "spin_direction": list(frame.rotors.spin_direction)}
     flight = lapwing.fly(

@@ -21,7 +21,7 @@ H = 0.004  # [s] of an exchange interval
 
 
 def bodies(*entries, restitution):
-    """(parameters, state) of vehicles of 0.5 m radius in free space: (airframe, position, velocity) each."""
+    """Return (parameters, state) of vehicles of 0.5 m radius in free space, each (airframe, position, velocity)."""
     result = []
     for frame, position, velocity in entries:
         e = from_scene({"collision": {"radius": 0.5, "restitution": restitution}}, frame)
@@ -31,7 +31,7 @@ def bodies(*entries, restitution):
 
 
 def fly(results, ticks):
-    """The states after so many ticks, one tick of all after the other."""
+    """Return the states after `ticks` ticks."""
     for tick in range(ticks):
         seen = [
             interaction.presence(p.effects)._replace(
@@ -79,7 +79,7 @@ def test_impact_keeps_tangential_velocity_and_momentum():
     assert velocities(flight)[1] @ tangent == pytest.approx(0.0, abs=1e-12)
 
 
-def test_three_that_meet_at_once_keep_their_momentum_and_part():
+def test_simultaneous_collision_of_three_keeps_momentum():
     result = bodies(
         (DRONE, (-0.95, 0.1, 0.0), (2.0, 0.0, 0.0)),
         (QUAD, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)),
@@ -105,13 +105,13 @@ def test_forces_on_pair_are_exactly_opposite():
     assert force[0] < 0.0 < force[1]
 
 
-def test_sphere_reaches_to_rotors_tips():
+def test_sphere_reaches_rotor_tips():
     quad = from_scene({"collision": {}}, QUAD)[0]
     assert quad.radius == pytest.approx(np.linalg.norm([0.13, 0.22, 0.023]) + 0.128)
 
 
 def ball(position, velocity, omega=(0.0, 0.0, 0.0), radius=0.5, mass=2.0, shape=0.4, friction=0.2, restitution=0.8):
-    """Sphere of the inertia shape m r^2: 2/5 is solid."""
+    """Return a sphere of inertia shape m r^2; 2/5 is solid."""
     inverse = 1.0 / (shape * mass * radius**2)
     matrix = (inverse, 0.0, 0.0, 0.0, inverse, 0.0, 0.0, 0.0, inverse)
     values = {"mass": mass, "radius": radius, "restitution": restitution, "friction": friction}
@@ -119,7 +119,7 @@ def ball(position, velocity, omega=(0.0, 0.0, 0.0), radius=0.5, mass=2.0, shape=
 
 
 def after(one, other):
-    """Velocities and rates of both after the impulse."""
+    """Return velocities and rates of both after the impulse."""
     e = from_scene({"collision": {"friction": 0.2}}, DRONE)[0]
     result = []
     for own, partner in ((one, other), (other, one)):
@@ -132,7 +132,7 @@ def after(one, other):
 
 @pytest.mark.parametrize("slip", [0.1, 0.7, 3.0])
 def test_oblique_impact_follows_walton(slip):
-    """Equal solid spheres: the tangential impulse is mu (1 + e) of the normal one, at most 2/7 of the slip's stop."""
+    """Solid spheres: the tangential impulse is mu (1 + e) times the normal one, at most 2/7 of the slip's momentum."""
     one, other = ball((0.0, 0.0, 0.0), (1.0, slip, 0.0)), ball((1.0 - 1e-9, 0.0, 0.0), (0.0, 0.0, 0.0))
     (v1, w1), (v2, w2) = after(one, other)
     normal = 2.0 / 2.0 * 1.8 * 1.0  # m/2 (1 + e) u
@@ -161,7 +161,7 @@ def test_friction_keeps_momentum_and_angular_momentum():
         assert turning == pytest.approx(np.zeros(3), abs=1e-12)
 
 
-def test_friction_takes_energy_and_never_reverses_slip():
+def test_friction_dissipates_energy_and_never_reverses_slip():
     rng = np.random.default_rng(4)
     for _ in range(20):
         velocity = tuple(rng.normal(0.0, 1.0, 3))
@@ -184,7 +184,7 @@ def test_friction_takes_energy_and_never_reverses_slip():
 
 
 def test_rough_vehicle_is_turned_by_glancing_impact():
-    """A vehicle of the plant: the torque of the effect reaches its body rates."""
+    """The torque of the effect changes the body rates of the plant's vehicle."""
     e = from_scene({"collision": {"radius": 0.5, "friction": 0.5}}, QUAD)
     p = multirotor.parameters(QUAD, e)
     state = multirotor.initial_state(p, (0.0, 0.0, 0.0), velocity_world=(1.0, 2.0, 0.0))

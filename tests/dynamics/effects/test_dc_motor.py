@@ -36,12 +36,12 @@ def test_loaded_balance_and_response_rate(drone, situation):
 def test_current_stays_within_controllers_limits(drone, situation):
     (e,) = effects.from_scene({"dc_motor": {}}, drone)
     _, current, _ = dc_motor.py_func(e, (), situation(speed=(0, 0, 400, 450)), NO_LOADS, (44.4, 0.0, 0.0, 44.4))
-    assert current[:3] == (26.5, 0.0, 0.0)  # Table 1; the controller would give 80
+    assert current[:3] == (26.5, 0.0, 0.0)  # Table 1; the controller's limit is 80
     assert 0 < current[3] < 26.5
 
 
 def test_power_balance(drone, situation):
-    """Electrical power is shaft power plus winding heat plus idle loss plus what accelerates the rotor."""
+    """Electrical power is the sum of shaft power, winding heat, idle loss and power that accelerates the rotor."""
     (e,) = effects.from_scene({"dc_motor": {}}, drone)
     loads = NO_LOADS._replace(torque=(0.5,) * 4)
     acceleration, current, _ = dc_motor.py_func(e, (), situation(speed=(281,) * 4), loads, (29.0,) * 4)
@@ -56,13 +56,13 @@ def changed(drone, **motor):
     return e
 
 
-def test_motor_takes_no_more_than_its_peak_power(drone, situation):
-    """A step to full voltage with the current free: K w I + R I^2 is the limit until the back-EMF is near it."""
+def test_motor_power_is_at_most_peak_power(drone, situation):
+    """Without a current limit, K w I + R I^2 is limited after a voltage step until the back-EMF is near 44.4 V."""
     e = changed(drone, peak_current=None)
     speeds = (0.0, 150.0, 200.0, 440.0)
     _, current, _ = dc_motor.py_func(e, (), situation(speed=speeds), NO_LOADS, (44.4,) * 4)
     power = [i * (K * w + R * i) for i, w in zip(current, speeds, strict=True)]
-    assert current[0] == 75.0  # a quarter of the pack's 30 C, 478 W; the controller would give 80
+    assert current[0] == 75.0  # a quarter of the pack's 30 C, 478 W; the controller's limit is 80
     assert power[1:3] == pytest.approx([1272.0] * 2)
     assert current[3] == pytest.approx((44.4 - K * 440.0) / R)
 
@@ -78,8 +78,8 @@ def test_resistance_of_controller_belt_and_inertia_of_motor(drone, situation):
     assert acceleration[0] == pytest.approx((0.96 * K * (current[0] - 1.0) - 0.5) / inertia)
 
 
-def test_power_follows_current_also_when_limited(drone, situation):
-    """26.5 A into a rotor at rest is R I^2, not the 44.4 V asked for times 26.5 A; running free it is V I."""
+def test_power_follows_limited_current(drone, situation):
+    """At 26.5 A a rotor at rest takes R I^2, not the desired 44.4 V times 26.5 A; a free-running rotor takes V I."""
     e = changed(drone, peak_power=None)
     _, current, power = dc_motor.py_func(e, (), situation(speed=(0, 200, 442, 470)), NO_LOADS, (44.4,) * 4)
     assert current[:2] == (26.5, 26.5)
@@ -92,7 +92,7 @@ def test_power_follows_current_also_when_limited(drone, situation):
     )
 
 
-def test_controllers_efficiency_is_paid_by_battery_alone(drone, situation):
+def test_controller_efficiency_affects_battery_only(drone, situation):
     s, loads = situation(speed=(300,) * 4), NO_LOADS._replace(torque=(0.5,) * 4)
     ideal, lossy = (dc_motor.py_func(changed(drone, esc_efficiency=f), (), s, loads, (30.0,) * 4) for f in (1.0, 0.9))
     assert lossy[:2] == ideal[:2]
@@ -108,9 +108,9 @@ def test_batterys_c_rating_is_shared_by_motors(drone, situation):
 
 
 def stepped(drone, s, voltages, start, seconds, step=2e-5, **table):
-    """Speed of an unloaded motor without idle current over time, by the midpoint rule; shape (n,).
+    """Return speeds of an unloaded motor without idle current, by the midpoint rule; shape (n,).
 
-    Each of the voltages lasts as long as the others.
+    All voltages last equally long.
     """
     motor = drone.motor.model_copy(update={"peak_current": None, "peak_power": None, "no_load_current": 0.0})
     frame = drone.model_copy(update={"motor": motor.model_copy(update={"esc_current": 1e4}), "battery": None})
@@ -134,7 +134,7 @@ def stepped(drone, s, voltages, start, seconds, step=2e-5, **table):
 
 @pytest.mark.parametrize("inductance", [1e-5, 5e-5, 1.4e-4])
 def test_inductance_follows_second_order_step(drone, situation, inductance):
-    """Closed form of L I' = V - K w - R I, J w' = K I for a step of the voltage, which leaves out no transient."""
+    """The reference is the closed form of L I' = V - K w - R I, J w' = K I after a voltage step, with its transient."""
     electrical, mechanical = inductance / R, 8.6e-4 * R / K**2
     speeds = stepped(drone, situation(), [5.0], 0.0, 0.03, inductance=inductance, braking_current=1e4)
     t = np.arange(len(speeds)) * 2e-5
@@ -146,8 +146,8 @@ def test_inductance_follows_second_order_step(drone, situation, inductance):
     assert 0.55 < missed < 0.95  # theory.md
 
 
-def test_current_goes_on_when_voltage_changes(drone, situation):
-    """Three voltages against the state-space solution of speed and current, by the matrix exponential."""
+def test_current_is_continuous_when_voltage_changes(drone, situation):
+    """The reference for three voltages is the state-space solution of speed and current by the matrix exponential."""
     inductance, J = 5e-5, 8.6e-4
     speeds = stepped(drone, situation(), [5.0, 9.0, 2.0], 0.0, 0.006, inductance=inductance, braking_current=1e4)
     A = np.array([[0.0, K / J, 0.0], [-K / inductance, -R / inductance, 1.0 / inductance], [0.0, 0.0, 0.0]])
@@ -161,7 +161,7 @@ def test_current_goes_on_when_voltage_changes(drone, situation):
 
 
 def test_braking_slows_down_as_fast_as_closed_form(drone, situation):
-    """Shorted winding: w falls with K^2/(J R); a limited current takes it down in proportion to time."""
+    """With a shorted winding w decays at the rate K^2/(J R); at the current limit it falls in proportion to time."""
     free = stepped(drone, situation(), [0.0], 300.0, 0.02, braking_current=1e4)
     t = np.arange(len(free)) * 2e-5
     assert free == pytest.approx(300.0 * np.exp(-t * K**2 / (8.6e-4 * R)), rel=1e-5)
@@ -170,8 +170,8 @@ def test_braking_slows_down_as_fast_as_closed_form(drone, situation):
     assert stepped(drone, situation(), [0.0], 300.0, 0.001) == pytest.approx([300.0] * 50)  # it does not brake
 
 
-def test_braking_gives_power_back(drone, situation):
-    """P = I (K w + R I), I = -20 A: 400 W of 29 V less the loss, times the controller's efficiency."""
+def test_braking_returns_power(drone, situation):
+    """P = I (K w + R I) at I = -20 A: 400 W at 29 V less the loss, times the controller's efficiency."""
     motor = drone.motor.model_copy(update={"esc_efficiency": 0.9})
     (e,) = effects.from_scene({"dc_motor": {"braking_current": 20.0}}, drone.model_copy(update={"motor": motor}))
     _, current, power = dc_motor.py_func(e, (), situation(speed=(300,) * 4), NO_LOADS, (0.0, 27.8, 28.0, 30.0))

@@ -1,4 +1,4 @@
-"""The jet below a vehicle against momentum theory and the conservation of its momentum."""
+"""Jet below a vehicle against momentum theory and conservation of momentum."""
 
 import math
 from pathlib import Path
@@ -29,7 +29,7 @@ def wind(offset, *others):
     return np.array(wind_of_jets(WASH, NO_WIND, NeighbourState(place), others or (hovering(),), 0.004))
 
 
-def test_disc_is_as_large_as_those_of_four_rotors():
+def test_disc_area_is_sum_of_four_rotors():
     assert math.pi * R * R == pytest.approx(4.0 * math.pi * 0.128**2)
 
 
@@ -43,7 +43,7 @@ def test_axial_velocity_doubles_and_jet_spreads():
 
 
 def test_half_width_equals_round_jet_of_pope():
-    """Half width 0.094 m a metre of way, once the disc's own size no longer counts."""
+    """The half width grows by 0.094 m per metre, far from the disc."""
     far = 1000.0
     half = 0.094 * (far + R / 0.113)
     assert wind((half, 0.0, -far))[2] == pytest.approx(0.5 * wind((0.0, 0.0, -far))[2], rel=0.01)
@@ -51,7 +51,7 @@ def test_half_width_equals_round_jet_of_pope():
 
 @pytest.mark.parametrize("way", [3.0, 10.0])
 def test_wake_momentum_equals_thrust(way):
-    """The flux of momentum through a plane below."""
+    """The reference is the flux of momentum through a plane below."""
     radius = np.linspace(0.0, 6.0 * (R + 0.113 * way), 2001)
     speed = np.array([-wind((r, 0.0, -way))[2] for r in radius])
     flux = np.trapezoid(DENSITY * speed**2 * 2.0 * math.pi * radius, radius)
@@ -67,7 +67,7 @@ def test_wake_opposes_thrust_and_wakes_add_up():
     assert wind((0.0, 0.0, -3.0), hovering(), hovering()) == pytest.approx(2.0 * wind((0.0, 0.0, -3.0)))
 
 
-def test_no_jet_without_thrust_or_of_one_that_names_no_wash():
+def test_no_jet_without_thrust_or_disc():
     assert not wind((0.0, 0.0, -1.0), hovering(NO_WIND), hovering(disc_radius=0.0)).any()
 
 

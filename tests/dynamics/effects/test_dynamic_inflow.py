@@ -1,4 +1,4 @@
-"""Against momentum theory: blades and disc give the same thrust in hover, climb and forward flight."""
+"""Dynamic inflow against momentum theory: blades and disc have equal thrust in hover, climb and forward flight."""
 
 import math
 
@@ -64,7 +64,7 @@ def test_blades_and_disc_agree(drone, situation, rotors, velocity):
 
 @pytest.mark.parametrize("velocity", [(0, 0, 0), (0, 0, 2), (8, 0, 0)])
 def test_induced_power_factor_scales_flow(drone, situation, rotors, velocity):
-    """Solved independently: the flow is 1.15 times that of momentum theory for the thrust; static loads stay."""
+    """The flow, solved independently, is 1.15 times that of momentum theory; static loads are unchanged."""
     propeller = drone.propeller.model_copy(update={"induced_power_factor": 1.15})
     e, static = make(drone.model_copy(update={"propeller": propeller}))
     s = situation(velocity=velocity)
@@ -82,7 +82,7 @@ def test_induced_power_factor_scales_flow(drone, situation, rotors, velocity):
 
 
 def test_translational_lift_and_descent(drone, situation, rotors):
-    """Forward flight thins the flow: more thrust for less power; slow descent thickens it more than climb thins it."""
+    """Forward flight reduces the flow: more thrust for less power. Descent raises it more than climb reduces it."""
     e, static = make(drone)
     thrust, torque = [], []
     for velocity in ((0, 0, 0), (10, 0, 0), (0, 0, 2), (0, 0, -2)):
@@ -109,7 +109,7 @@ def test_inflow_rate_follows_apparent_mass(drone, situation, rotors):
         assert memory[0] - hover == pytest.approx(0.01 * math.exp(-rate * 0.01), rel=0.01)
 
 
-def test_each_hub_has_its_own_speed(drone, situation, rotors):
+def test_inflow_follows_speed_of_each_hub(drone, situation, rotors):
     e, static = make(drone)
     s = situation(omega=(1.0, 0.0, 0.0))
     _, after = loads(e, static, settled(e, situation(), rotors), s)
@@ -117,7 +117,7 @@ def test_each_hub_has_its_own_speed(drone, situation, rotors):
     assert after.thrust[0] == pytest.approx(after.thrust[1])
 
 
-def test_rotor_at_rest(drone, situation, rotors):
+def test_rotor_at_rest_has_no_loads(drone, situation, rotors):
     e, static = make(drone)
     s = situation(speed=(0.0,) * 4, velocity=(3, 0, -2))
     memory = settled(e, s, rotors)

@@ -1,4 +1,4 @@
-"""Feet side by side in lanes do what each foot does for itself, to the bit, whatever number of them there is."""
+"""Feet computed in vector lanes are bit-for-bit identical to single feet, for any number of feet."""
 
 import math
 from typing import Any, NamedTuple
@@ -46,7 +46,7 @@ def smooth(e, memory, s):
 
 
 class Foot:
-    """One foot, by the equations (2.12) to (2.17) of theory.md."""
+    """One foot by eqs. (2.12) to (2.17) of theory.md."""
 
     def __init__(self, e, s, body):
         m = s.motion
@@ -92,7 +92,7 @@ class Foot:
 
 
 def drawn(rng, e):
-    """A vehicle near the ground with its feet at all heights within a tenth of a millimetre or so of it."""
+    """Return a random vehicle whose feet are within about a tenth of a millimetre of the ground."""
     turn = rng.normal(scale=3e-4, size=3)
     attitude = Quaternion(*map(float, np.append(1.0, 0.5 * turn) / math.hypot(1.0, *0.5 * turn)))
     place = (*map(float, rng.uniform(-0.002, 0.002, 2)), 0.35 + float(rng.uniform(-2e-4, 5e-5)))

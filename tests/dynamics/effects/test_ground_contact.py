@@ -1,4 +1,4 @@
-"""Landing, resting, sliding, bouncing and falling over on level ground, slopes and bumps."""
+"""Landing, resting, sliding, bouncing and tipping over on level ground, slopes and bumps."""
 
 import math
 
@@ -25,7 +25,7 @@ OFF = (0.0,) * 4
 
 
 def setting(drone, height=0.0, angle=0.0, velocity=(0.0, 0.0, 0.0), tilt=(0.0, 0.0, 0.0), bumps=None, **table):
-    """The drone over ground that rises along y by `angle`, its feet parallel to it but for `tilt`, `height` above."""
+    """Return the drone at `height` over ground that rises along y by `angle`, turned from the ground by `tilt`."""
     around = Environment(terrain=relief((0.0, math.tan(angle)), **(bumps or {})))
     p = multirotor.parameters(drone, effects.from_scene({"gravity": {}, "ground_contact": table}, drone, around))
     rotation = Rotation.from_rotvec((angle, 0.0, 0.0)) * Rotation.from_rotvec(tilt)
@@ -45,7 +45,7 @@ def energy(p, m):
 
 
 def settled(drone, angle=0.0, **table):
-    """Set down at rest with the feet as deep as they carry the weight: k d s(d / w) = m g cos a / 4."""
+    """Return the drone at rest, its feet so deep that they carry the weight: k d s(d / w) = m g cos a / 4."""
     load = drone.mass.total * G * math.cos(angle) / 4
     depth = brentq(lambda d: 1e6 * d * (d / 1e-4) ** 2 * (3 - 2 * d / 1e-4) - load, 0.0, 1e-4)
     p, state = setting(drone, -depth, angle, **table)
@@ -130,7 +130,7 @@ def test_lands_on_level_ground_and_stays(drone, speed, tilt):
 @pytest.mark.parametrize("tilt", [(0.0, 0.0, 0.0), (0.15, -0.1, 0.3)], ids=["upright", "tilted"])
 @pytest.mark.parametrize("speed", [0.1, 0.3, 1.0, 3.0])
 def test_lands_on_slope_and_stays_or_slides(drone, speed, tilt):
-    """20 degrees lie between the friction angles: what the impact does not stop slides on, by the closed form."""
+    """At 20 degrees, between the friction angles, a vehicle that the impact does not stop slides by the closed form."""
     angle = math.radians(20)
     p, state = setting(drone, height=0.08, angle=angle, velocity=(0.0, 0.0, -speed), tilt=tilt)
     state = run(p, state, 3.0)
@@ -154,7 +154,7 @@ def test_soft_touch_down_on_slope_sticks(drone, speed):
 @pytest.mark.parametrize("h", [1e-3, 4e-3])
 @pytest.mark.parametrize("tilt", [(0.0, 0.0, 0.0), (0.2, 0.1, 0.0)], ids=["upright", "tilted"])
 def test_bounces_without_gaining_energy(drone, tilt, h):
-    """Energy at the moments in the air never grows, from one to the next."""
+    """The energy in the air never grows."""
     p, state = setting(drone, height=1.0, tilt=tilt, damping=50.0)
     energies, bounces, flying = [energy(p, state.motion)], 0, True
     for _ in range(round(4.0 / h)):
@@ -171,7 +171,7 @@ def test_bounces_without_gaining_energy(drone, tilt, h):
 
 @pytest.mark.parametrize(("roll", "over"), [(0.5, False), (0.8, True)])
 def test_falls_back_on_its_feet_or_over(drone, roll, over):
-    """Standing on two feet, it tips over once the centre of mass is beyond them: roll over atan(0.25 / 0.35) = 0.62."""
+    """On two feet the vehicle tips over when its centre of mass is beyond them: roll above atan(0.25 / 0.35) = 0.62."""
     edge = np.array([0.0, -0.25, -0.35])
     p, state = setting(drone, tilt=(roll, 0.0, 0.0))
     height = -(Rotation.from_rotvec((roll, 0, 0)).apply(edge))[2]
@@ -193,7 +193,7 @@ def test_vehicle_rests_on_bumps(drone):
 
 
 @pytest.mark.parametrize("friction", ["stick_slip", "regularised"])
-def test_splitting_of_steps_does_not_show(drone, friction):
+def test_split_step_equals_fine_steps(drone, friction):
     """A step of 4 ms, split while in contact, ends where steps of 0.25 ms do, after five bounces and a slide."""
     coarse, fine = (
         run(*setting(drone, height=0.05, velocity=(0.3, 0.0, -1.0), friction=friction), 1.0, h).motion
@@ -203,7 +203,7 @@ def test_splitting_of_steps_does_not_show(drone, friction):
 
 
 def bounced(drone, start, speed, seconds):
-    """Velocity [m/s] `seconds` after a fall from `start` [m] over the ground, by SciPy, written apart."""
+    """Return the velocity [m/s] `seconds` after a fall from `start` [m] above the ground, independently by SciPy."""
     mass = drone.mass.total
 
     def rate(t, y):
@@ -218,7 +218,7 @@ def bounced(drone, start, speed, seconds):
 
 @pytest.mark.parametrize("phase", [0.0, 0.3, 0.5, 0.9])
 def test_bounce_is_independent_of_phase_in_step(drone, phase):
-    """At 1 ms, fallen at 1 m/s: what is left of the speed, to a ten-thousandth."""
+    """The speed after an impact at 1 m/s with steps of 1 ms is the same to a ten-thousandth."""
     start = 2e-3 + phase * 1e-3
     p, state = setting(drone, height=start, velocity=(0.0, 0.0, -1.0))
     speed = run(p, state, 12e-3).motion.velocity_world[2]
@@ -228,7 +228,7 @@ def test_bounce_is_independent_of_phase_in_step(drone, phase):
 
 
 def test_friction_converges_with_tolerance(drone):
-    """A slide that turns, bounces and sticks: its end comes nearer to one place as the tolerance falls."""
+    """The end of a slide with turns, bounces and sticking converges as the tolerance falls."""
     p, state = setting(drone, height=0.03, velocity=(0.5, 0.0, -0.3), tilt=(0.0, 0.0, 0.1))
     ends = [run(p._replace(tolerance=tolerance), state, 1.0).motion for tolerance in (1e-4, 1e-8, 1e-9)]
     coarse, fine = (np.abs(np.subtract(m.position_world, ends[-1].position_world)).max() for m in ends[:-1])
@@ -251,12 +251,12 @@ def test_friction_converges_with_tolerance(drone):
         ({"stifness": 1e5}, "effects.ground_contact.stifness: unknown key 'stifness'; did you mean stiffness?"),
     ],
 )
-def test_refused(drone, table, message):
+def test_invalid_options_are_rejected(drone, table, message):
     with pytest.raises(ValueError) as error:
         effects.from_scene({"ground_contact": table}, drone)
     assert message in str(error.value)
 
 
-def test_needs_feet(drone):
+def test_vehicle_without_feet_is_rejected(drone):
     with pytest.raises(ValueError, match=r"effects.ground_contact: the vehicle has no feet"):
         effects.from_scene({"ground_contact": {}}, drone.model_copy(update={"contact": None}))

@@ -15,13 +15,13 @@ def test_law_of_cheeseman_and_bennett(height, expected):
     assert gain(height) == pytest.approx(expected, rel=1e-14)
 
 
-def test_falls_with_height_without_step():
+def test_gain_falls_with_height_without_step():
     values = np.array([gain(z) for z in np.linspace(0.5, 8.5, 4001)])
     assert (np.diff(values) <= 0).all()
     assert np.abs(np.diff(values[2000:])).max() < 1e-5
 
 
-def test_lower_rotor_gets_more(drone, situation):
+def test_lower_rotor_gains_more(drone, situation):
     (e,) = effects.from_scene({"ground_effect": {}}, drone)
     level = ground_effect.py_func(e, (), situation(position=(0, 0, 2 * RADIUS)), NO_FACTORS)
     assert level.thrust == pytest.approx([64 / 63] * 4)

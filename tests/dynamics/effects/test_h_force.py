@@ -6,8 +6,8 @@ from lapwing.dynamics import effects
 from lapwing.dynamics.effects.h_force import h_force
 
 
-def test_is_sum_over_rotors(drone, situation, rotors):
-    """Each rotor by itself: force -rho c w (v + omega x r), in its plane, at r."""
+def test_force_is_sum_over_rotors(drone, situation, rotors):
+    """Each rotor contributes -rho c w (v + omega x r) in its plane, at r."""
     lifted = drone.model_copy(
         update={
             "rotors": drone.rotors.model_copy(

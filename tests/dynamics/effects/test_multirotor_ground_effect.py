@@ -1,4 +1,4 @@
-"""Against the published law for quadrotors, closed forms for parts of the ground, and its limits."""
+"""Multirotor ground effect against the published law for quadrotors, closed forms for partial ground, and limits."""
 
 import math
 
@@ -26,7 +26,7 @@ def thrust(e, s):
 
 
 def published(z, fountain):
-    """Sanchez-Cuevas et al., eq. (4), as printed."""
+    """Return the ratio of Sanchez-Cuevas et al., eq. (4), as printed."""
     images = (R / (4 * z)) ** 2 + R**2 * z / (D**2 + 4 * z**2) ** 1.5 + 0.5 * R**2 * z / (2 * D**2 + 4 * z**2) ** 1.5
     return 1 / (1 - images - 2 * R**2 * z * fountain / (B**2 + 4 * z**2) ** 1.5)
 
@@ -53,12 +53,12 @@ def test_gain_fades_without_step(drone, situation):
 
 
 def table(edge, width=100.0):
-    """Level surface at TOP where world x is below `edge`."""
+    """Return a level surface at TOP where world x is below `edge`."""
     return relief(boxes=[(edge - 50.0, 0.0, 100.0, width, 0.0, TOP)])
 
 
 def test_only_rotors_over_table_gain(drone, situation):
-    """Two rotors behind the edge: own image and one neighbour's; the fountain by a third of the others."""
+    """Rotors over the table see their image and one neighbour's, and a third of the fountain."""
     e = make(drone, table(0.0))
     z = R
     gains = thrust(e, situation(position=(0, 0, TOP + z)))
@@ -76,7 +76,7 @@ def test_single_rotor_over_table_follows_cheeseman_and_bennett(drone, situation)
 
 
 def test_disc_over_edge_gains_by_its_area(drone, situation):
-    """Eight places of equal area against a circle's segment; theory.md has the largest difference."""
+    """Eight points of equal area approximate a circle's segment; theory.md lists the largest difference."""
     largest = 0.0
     for inside in np.linspace(-1.2, 1.2, 49):  # radii from the edge to the axis, positive over the table
         s = situation(position=(0, 0, TOP + R), turn=(0, 0, math.pi / 4))
@@ -88,8 +88,8 @@ def test_disc_over_edge_gains_by_its_area(drone, situation):
     assert largest < 0.13
 
 
-def test_forward_flight_takes_gain_away(drone, situation):
-    """Cheeseman and Bennett: the cancelled share over 1 + (V / v)^2, v of forward flight (Glauert)."""
+def test_forward_flight_reduces_gain(drone, situation):
+    """Cheeseman and Bennett: the cancelled share is divided by 1 + (V / v)^2, v of forward flight (Glauert)."""
     e = make(drone, fountain=0.0)
     hover = e.flow * 300.0
     still = 1.0 - 1.0 / thrust(e, situation(position=(0, 0, R)))[0]
@@ -99,7 +99,7 @@ def test_forward_flight_takes_gain_away(drone, situation):
         assert moving == pytest.approx(still / (1.0 + (speed / v) ** 2), rel=1e-9)
 
 
-def test_sleeps_only_without_influence(drone, situation):
+def test_effect_sleeps_only_without_influence(drone, situation):
     e = make(drone)
     assert high.py_func(e, situation(position=(0, 0, e.highest + 0.01), velocity=(0, 0, -4)).motion, 0.001)
     assert not high.py_func(e, situation(position=(0, 0, e.highest - 0.01)).motion, 0.001)

@@ -20,7 +20,7 @@ def test_mass_and_inertia_with_and_without(drone):
     assert np.multiply(empty.inertia, empty.inverse_inertia) == pytest.approx(np.ones(3))
 
 
-def test_lets_go_at_its_time_and_never_again(drone):
+def test_payload_is_released_once_at_its_time(drone):
     e = make(drone, release_time=3.0)
     assert release.py_func(e, (0.0,), 2.999) == (0.0,)
     assert release.py_func(e, (0.0,), 3.0) == (1.0,)
@@ -35,6 +35,6 @@ def test_lets_go_at_its_time_and_never_again(drone):
         ({"mass": 9.0, "size": [2.0, 2.0, 2.0]}, r"effects.payload_release: takes more inertia"),
     ],
 )
-def test_refused(drone, table, message):
+def test_invalid_payload_is_rejected(drone, table, message):
     with pytest.raises(ValueError, match=message):
         make(drone, **table)

@@ -16,7 +16,7 @@ def make(drone, **table):
     return e
 
 
-def test_force_of_steady_wind_is_source_formula(drone, situation, rotors):
+def test_force_of_steady_wind_follows_source_formula(drone, situation, rotors):
     e = make(drone, sigma=0.0)
     s = situation(velocity=(1, 1, 0))
     memory = draw.py_func(e, e.initial_discrete_state(), s, rotors(), KEY, 0, 0.004)
@@ -26,7 +26,7 @@ def test_force_of_steady_wind_is_source_formula(drone, situation, rotors):
 
 
 def test_draws_have_mean_and_deviation(drone, situation, rotors):
-    """The wind's draws, got back from the force: F = k |v| v."""
+    """The draws of the wind are recovered from the force F = k |v| v."""
     e, s = make(drone), situation()
     forces = np.array([draw.py_func(e, (), s, rotors(), KEY, tick, 0.004)[0] for tick in range(2000)])
     size = np.linalg.norm(forces, axis=1, keepdims=True)
@@ -35,7 +35,7 @@ def test_draws_have_mean_and_deviation(drone, situation, rotors):
     assert wind.std(axis=0) == pytest.approx((0.7,) * 3, rel=0.07)
 
 
-def test_depends_on_tick_and_key_only(drone, situation, rotors):
+def test_force_depends_on_tick_and_key_only(drone, situation, rotors):
     e, s = make(drone), situation()
     other = ((1.0, 2.0, 3.0), (4.0, 5.0, 6.0))
     one = draw.py_func(e, other, s, rotors(), KEY, 7, 0.004)
@@ -45,7 +45,7 @@ def test_depends_on_tick_and_key_only(drone, situation, rotors):
 
 
 def test_wind_of_force_is_reported(drone, situation, rotors):
-    """The truth's wind: 0 before, though the vehicle was blown about."""
+    """The reported wind is that of the force."""
     e, s = make(drone), situation(velocity=(1, 1, 0))
     memory = draw.py_func(e, e.initial_discrete_state(), s, rotors(), KEY, 5, 0.004)
     wind = np.array(told.py_func(e, memory, (0.5, 0.0, 0.0))) - (0.5, 0.0, 0.0)
@@ -61,7 +61,7 @@ def series(e, s, rotors, key, interval, out):
 
 
 def test_spectrum_does_not_depend_on_exchange_interval(drone, situation, rotors):
-    """sigma^2 T, two-sided, below the frequency of the draws, for wind and (linearised about the mean) for force."""
+    """Wind and force (linearised about the mean) have the two-sided density sigma^2 T below the draw frequency."""
     e, densities, means = make(drone), [], []
     for interval in (0.001, 0.004, 0.01, 0.02):
         out = np.empty((round(800.0 / interval), 2))
@@ -74,7 +74,7 @@ def test_spectrum_does_not_depend_on_exchange_interval(drone, situation, rotors)
     assert means == pytest.approx([means[1]] * 4, rel=0.01)
 
 
-def test_draw_is_shared_by_ticks_and_averaged_over_long_ones(drone, situation, rotors):
+def test_short_ticks_share_draws_and_long_ticks_average_them(drone, situation, rotors):
     e, s = make(drone), situation()
 
     def at(tick, interval):

@@ -1,4 +1,4 @@
-"""The plant on ground that is not level: landing, rest, sliding off an edge, running into a wall."""
+"""Plant on uneven ground: landing, rest, sliding off an edge, impact on a wall."""
 
 import math
 
@@ -46,7 +46,7 @@ def still(motion):
 
 
 @pytest.mark.parametrize("place", [(0.05, 0.02), (0.4, 0.3), (-0.3, 0.9)])
-def test_lands_on_bumps_on_three_feet_at_least(drone, place):
+def test_vehicle_lands_on_bumps_on_three_feet_at_least(drone, place):
     p = vehicle(drone, BUMPS)
     m = run(p, dropped(p, (*place, 0.45), (0.0, 0.0, -0.5)), 4.0).motion
     heights = feet_over_ground(drone, BUMPS, m)
@@ -56,14 +56,14 @@ def test_lands_on_bumps_on_three_feet_at_least(drone, place):
 
 
 @pytest.mark.parametrize(("x", "ground"), [(0.0, 0.0), (1.5, 0.1), (3.0, -0.3)])
-def test_lands_on_treads_of_stair(drone, x, ground):
+def test_vehicle_lands_on_treads_of_stair(drone, x, ground):
     p = vehicle(drone, STAIR)
     m = run(p, dropped(p, (x, 0.0, 0.6), (0.0, 0.0, -0.5)), 3.0).motion
     assert still(m)
     assert m.position_world[2] == pytest.approx(ground + HEIGHT, abs=1e-4)
 
 
-def test_grid_is_slope_that_its_points_are(drone):
+def test_grid_of_points_on_slope_equals_slope(drone):
     slope = relief(slope=(0.1, 0.0))
     ends = []
     for terrain in (slope, GRID):
@@ -75,8 +75,8 @@ def test_grid_is_slope_that_its_points_are(drone):
     assert ends[0] == pytest.approx(ends[1], abs=1e-9)
 
 
-def test_slides_off_edge_and_falls(drone):
-    """0.7 m before the edge at 3 m/s; the tread below lies 0.4 m lower."""
+def test_vehicle_slides_off_edge_and_falls(drone):
+    """The slide starts 0.7 m before the edge at 3 m/s; the next tread is 0.4 m lower."""
     p = vehicle(drone, STAIR)
     start = dropped(p, (1.3, 0.0, 0.1 + HEIGHT), (3.0, 0.0, 0.0))
     before, after = run(p, start, 0.1).motion, run(p, start, 4.0).motion

@@ -5,7 +5,7 @@ from lapwing.dynamics import effects
 from lapwing.dynamics.effects.rotor_damage import rotor_damage, strike
 
 
-def test_one_rotor_from_its_time(drone, situation):
+def test_damage_acts_on_one_rotor_from_its_time(drone, situation):
     (e,) = effects.from_scene(
         {"rotor_damage": {"rotor": 2, "time": 4.0, "remaining_thrust": 0.6, "remaining_torque": 1.1}}, drone
     )

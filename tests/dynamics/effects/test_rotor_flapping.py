@@ -1,4 +1,4 @@
-"""Against the tilt by hand, the moments of the tilted thrusts, and the form that H-force has."""
+"""Rotor flapping against tilts by hand, moments of the tilted thrusts, and the form of the H-force."""
 
 import math
 
@@ -18,7 +18,7 @@ def make(drone, **table):
 
 
 def test_thrust_tilts_with_advance_ratio(drone, situation, rotors):
-    """8 m/s at 300 rad/s: mu = 0.0954; against the way through the air, whatever the heading."""
+    """8 m/s at 300 rad/s is mu = 0.0954; the thrust tilts against the air velocity at every heading."""
     e, mu = make(drone, coefficient=0.3), 8.0 / (300.0 * R)
     tilt = 0.3 * mu / (1 - mu**2 / 2)
     force, torque = rotor_flapping.py_func(e, (), situation(velocity=(8, 0, 3), wind=(0, 0, 2)), rotors(thrust=25.0))
@@ -37,7 +37,7 @@ def test_coefficient_of_propeller(drone):
 
 
 def test_stiff_hub_pitches_nose_up(drone, situation, rotors):
-    """Flying ahead: minus y in FLU; flying to the left: rolls to the right, plus x."""
+    """Forward flight turns about -y in FLU; flight to the left rolls to the right, about +x."""
     e, mu = make(drone, coefficient=0.3, stiffness=2.0), 8.0 / (300.0 * R)
     moment = 4 * 2.0 * 0.3 * mu / (1 - mu**2 / 2)
     _, ahead = rotor_flapping.py_func(e, (), situation(velocity=(8, 0, 0)), rotors())
@@ -47,7 +47,7 @@ def test_stiff_hub_pitches_nose_up(drone, situation, rotors):
 
 
 def test_low_speed_force_has_form_of_h_force(drone, situation, rotors):
-    """T = k_T rho w^2: a force -rho (k_T k / R) w v on each rotor, turning included."""
+    """T = k_T rho w^2 implies a force -rho (k_T k / R) w v on each rotor, also in rotation."""
     static = effects.from_scene({"rotor_thrust": {}}, drone)[0].thrust_constant
     e = make(drone, coefficient=0.3)
     (same,) = effects.from_scene({"h_force": {"coefficient": 0.3 * static / R}}, drone)

@@ -1,4 +1,4 @@
-"""Against published slopes, limits and a survey of the flow about a rotor, and momentum theory in tandem."""
+"""Rotor interference against published slopes, limits, a flow survey around a rotor, and tandem momentum theory."""
 
 import math
 
@@ -23,7 +23,7 @@ def make(drone):
 
 
 def changes(drone, s):
-    """Thrust and torque of each rotor over the static ones, less 1."""
+    """Return relative changes of thrust and torque of each rotor from the static loads."""
     e, static = make(drone)
     before = rotor_thrust.py_func(static, (), s, NO_FACTORS, NO_LOADS)
     after = rotor_interference.py_func(e, (), s, NO_FACTORS, before)
@@ -57,7 +57,7 @@ def test_flow_behind_rotor_against_survey():
 
 
 def test_flow_against_integral_along_wake():
-    """Biot and Savart ring by ring, without the closed form along the wake."""
+    """The reference sums Biot-Savart ring by ring, without the closed form along the wake."""
     tangent, x, y, z = 1.5, 1.7, 0.6, 0.1
     length = math.hypot(1.0, tangent)
     ex, ez = tangent / length, -1.0 / length
@@ -72,7 +72,7 @@ def test_flow_against_integral_along_wake():
 
 
 def test_mean_over_disc_is_accurate():
-    """64 places against 1536; the largest difference of a table is in theory.md."""
+    """64 points are compared with 1536; theory.md lists the largest difference."""
     rings, places = 16, 96
     worst = 0.0
     for skew in (0.5, 0.75, 1.0):
@@ -113,7 +113,7 @@ def test_loss_turns_with_direction_of_flight(drone, situation):
 
 
 def test_blades_and_discs_agree(drone, situation):
-    """Solved by another method: slope w (P w - V - v - u) = 2 A v sqrt(V_xy^2 + (V + v)^2) with the others' flow u."""
+    """Independent solution of slope w (P w - V - v - u) = 2 A v sqrt(V_xy^2 + (V + v)^2), u: flow of other rotors."""
     e, _ = make(drone)
     s = situation(speed=(SPEED,) * 4, velocity=(12.0, 0, 0))
     thrust, _ = changes(drone, s)

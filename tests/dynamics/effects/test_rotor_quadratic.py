@@ -5,7 +5,7 @@ from lapwing.dynamics import effects
 from lapwing.dynamics.effects.rotor_quadratic import rotor_quadratic
 
 
-def test_loads(drone, situation):
+def test_loads_are_quadratic_in_speed(drone, situation):
     (e,) = effects.from_scene({"rotor_quadratic": {"thrust_constant": 3e-5, "torque_constant": 7e-7}}, drone)
     loads = rotor_quadratic.py_func(e, (), situation(speed=(100, 200, 0, 50)), NO_FACTORS, NO_LOADS)
     assert loads.thrust == pytest.approx([0.3, 1.2, 0.0, 0.075])

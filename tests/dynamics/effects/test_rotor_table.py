@@ -1,4 +1,4 @@
-"""Against the definitions of the coefficients, and against what is wrong with a table."""
+"""Rotor tables against the definitions of their coefficients; faulty tables."""
 
 import math
 
@@ -46,14 +46,14 @@ def test_torque_coefficients_commas_and_comments(drone, situation, tmp_path):
 
 
 def test_grid_over_angle_of_air(drone, situation, tmp_path):
-    """At 0.1 across the axis halfway to 0.12; at 45 degrees the mean of the two rows."""
+    """Values at 0.1 and at 45 degrees are interpolated between rows."""
     e = make(drone, tmp_path, GRID)
     v = 0.1 * N * D
     for velocity, ct in (((v, 0, 0), 0.11), ((0, 0, v), 0.09), ((v / math.sqrt(2), 0, v / math.sqrt(2)), 0.10)):
         assert loads(e, situation(velocity=velocity)).thrust == pytest.approx([ct * 1.2 * N**2 * D**4] * 4)
 
 
-def test_hubs_have_their_own_advance_and_rotors_at_rest_no_loads(drone, situation, tmp_path):
+def test_each_hub_has_its_advance_and_rotors_at_rest_have_no_loads(drone, situation, tmp_path):
     e = make(drone, tmp_path)
     turning = loads(e, situation(velocity=(0, 0, 5.0), omega=(1.0, 0.0, 0.0))).thrust
     assert turning[0] < turning[2]

@@ -9,7 +9,7 @@ from lapwing.dynamics.vehicles.propeller import thrust_coefficient, torque_coeff
 
 
 def test_loads_by_source_formula(drone, situation):
-    """rho C_T (N / 60)^2 D^4 and rho C_M (N / 60)^2 D^5 at 3168 rpm."""
+    """Loads are rho C_T (N / 60)^2 D^4 and rho C_M (N / 60)^2 D^5 at 3168 rpm."""
     (e,) = effects.from_scene({"rotor_thrust": {}}, drone)
     speed = 3168 / 60 * 2 * math.pi
     loads = rotor_thrust.py_func(e, (), situation(speed=(speed,) * 4), NO_FACTORS, NO_LOADS)
@@ -28,7 +28,7 @@ def test_hover_thrust_is_about_half_highest(drone, situation):
     assert 1.9 < loads.thrust[0] / (10.0224 * 9.80665 / 4) < 2.0  # the source asks for a ratio of two
 
 
-def test_needs_propeller(drone):
+def test_airframe_without_propeller_is_rejected(drone):
     bare = drone.model_copy(update={"propeller": None})
     with pytest.raises(ValueError, match=r"effects.rotor_thrust: the vehicle has no \[propeller\]"):
         effects.from_scene({"rotor_thrust": {}}, bare)

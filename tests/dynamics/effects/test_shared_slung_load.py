@@ -1,4 +1,4 @@
-"""The cable of a shared load that comes taut and slack within a step, against the closed form."""
+"""Cable of a shared load that becomes taut and slack within a step, against the closed form."""
 
 import pytest
 
@@ -23,7 +23,7 @@ FREQUENCY = 8.0  # [rad/s], so slow that RK4 has no error while the cable is tau
 
 @pytest.mark.parametrize("steps", [1, 4])
 def test_carrier_rebounds_from_taut_cable_as_damped_spring(steps):
-    """Without weight, from a load that does not move. Any step is as accurate as the tolerance."""
+    """Without weight and with a fixed load, every step is as accurate as the tolerance."""
     mass, length = QUAD.mass.total, 2.0
     sling = Sling(1.0, length, mass * FREQUENCY**2, 2.0 * RATIO * FREQUENCY * mass, ZERO, 0.0, LEVEL)
     p = multirotor.parameters(QUAD, (SharedSlungLoad(sling),))._replace(tolerance=1e-10)

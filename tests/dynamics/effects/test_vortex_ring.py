@@ -1,4 +1,4 @@
-"""Against the published place, size and period of losses and fluctuations in descent."""
+"""Vortex ring state against published place, size and period of losses and fluctuations in descent."""
 
 import math
 
@@ -25,7 +25,7 @@ def factors(e, memory, s):
 
 @pytest.fixture(scope="module")
 def oscillation(drone, situation, rotors):
-    """Oscillation of four rotors over 6000 ticks, 1260 revolutions, shape (6000, 4)."""
+    """Return the oscillation of four rotors over 6000 ticks, 1260 revolutions, shape (6000, 4)."""
     e, s = make(drone), situation(speed=(SPEED,) * 4)
     memory, rows = e.initial_discrete_state(), []
     for tick in range(6000):
@@ -35,7 +35,7 @@ def oscillation(drone, situation, rotors):
 
 
 def test_loss_and_fluctuation_peak_at_published_descent():
-    """Veismann, Dougherty and Gharib: 1.2 to 1.3 induced velocities, for the mean loss as for the fluctuations."""
+    """Veismann, Dougherty and Gharib: mean loss and fluctuations peak at 1.2 to 1.3 induced velocities."""
     descent = np.linspace(-1.0, 3.0, 4001)
     values = np.array([strength(x, 0.0) for x in descent])
     assert 1.2 <= descent[values.argmax()] <= 1.3
@@ -71,7 +71,7 @@ def test_fluctuation_from_peak_to_peak_is_near_published(drone, situation, oscil
 
 
 def test_rings_leave_in_published_intervals(oscillation):
-    """20 to 50 revolutions: most of the variance has periods between, and the mean interval is there."""
+    """Most of the variance and the mean interval are within 20 to 50 revolutions."""
     n = len(oscillation)
     power = (np.abs(np.fft.rfft(oscillation, axis=0)) ** 2).sum(axis=1)
     per_turn = np.fft.rfftfreq(n, INTERVAL) * 2 * math.pi / SPEED  # [1/revolution]

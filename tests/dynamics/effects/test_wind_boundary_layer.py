@@ -24,6 +24,6 @@ def test_wind_is_logarithmic_in_height_over_ground(drone, situation, terrain, gr
     assert wind(10.0) == pytest.approx((0.0, 8.0, 0.0), abs=1e-9)
     assert wind(0.0) == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
     assert wind(-1.0)[1] == 0.0
-    # friction velocity over von Karman's constant, whatever the height: u = a ln(1 + z / z0)
+    # friction velocity over von Karman's constant at every height: u = a ln(1 + z / z0)
     for height in (0.5, 3.0, 60.0):
         assert wind(height)[1] / math.log1p(height / 0.1) == pytest.approx(8.0 / math.log(101.0), rel=1e-6)

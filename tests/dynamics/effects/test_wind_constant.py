@@ -7,13 +7,13 @@ from lapwing.dynamics.effects.wind_constant import WindConstant, wind_constant
 from lapwing.dynamics.vehicles import multirotor
 
 
-def test_adds_to_wind(situation):
+def test_uniform_wind_is_added(situation):
     s = situation(wind=(1, 0, 0), density=1.1)
     assert wind_constant.py_func(WindConstant((2.0, -1.0, 0.5)), (), s, s.air) == (1.1, (3.0, -1.0, 0.5))
 
 
 def test_every_aerodynamic_effect_feels_motion_of_air(drone):
-    """At rest in a wind is flying against it in still air, for drag, H-force and inflow (Galileo)."""
+    """Rest in wind equals flight against it in still air for drag, H-force and inflow (Galileo)."""
     tables = {"rotor_thrust": {}, "axial_inflow": {}, "body_drag": {}, "h_force": {}}
     wind = (4.0, -2.0, 1.0)
     still = multirotor.parameters(drone, effects.from_scene(tables, drone))

@@ -35,7 +35,7 @@ def series(e, memory, s, rotors, key, interval, out):
 
 
 def published(omega):
-    """Densities [(rad/s)^2 s/rad] of p, q and r."""
+    """Return densities [(rad/s)^2 s/rad] of p, q and r."""
     sigma, scale = intensity(WIND, ALTITUDE)
     w, v = (
         sigma[i] ** 2 * scale[i] / (math.pi * AIRSPEED) * (1 + 3 * x) / (1 + x) ** 2

@@ -1,4 +1,4 @@
-"""Von Karman turbulence against its published spectra, in closed form and as it is drawn."""
+"""Von Karman turbulence: closed form and random draws against published spectra."""
 
 import math
 
@@ -16,13 +16,13 @@ KEY = stream_key(5, "drone1", "effects")
 
 
 def published(x):
-    """MIL-F-8785C, section 3.7.1.1: (along, across) one-sided over x = L omega / V, for unit deviation and L / V."""
+    """Return (along, across) of MIL-F-8785C, 3.7.1.1, one-sided over x = L omega / V, unit variance and L / V."""
     square = (1.339 * x) ** 2
     along = 2.0 / math.pi / (1.0 + square) ** (5 / 6)
     return along, (1.0 + 8.0 / 3.0 * square) / (1.0 + square) ** (11 / 6) / math.pi
 
 
-def test_sum_of_its_parts_is_von_karmans():
+def test_sum_of_parts_is_von_karman_spectrum():
     x = np.logspace(-2, math.log10(300.0), 200)
     along = sum(2.0 / math.pi * c**2 * r / (r**2 + x**2) for r, c, _ in PARTS)
     across = sum(c**2 * r * (r**2 + 3.0 * x**2) / (r**2 + x**2) ** 2 for r, c, _ in PARTS) / math.pi

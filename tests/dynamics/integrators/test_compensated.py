@@ -1,4 +1,4 @@
-"""Compensated sums of steps: exact fractions, free fall and an oscillator of 50 digits, beside plain sums."""
+"""Compensated sums of steps and plain sums against exact fractions, free fall and a 50-digit oscillator."""
 
 from fractions import Fraction
 from functools import cache
@@ -94,8 +94,8 @@ def test_remainder_is_kept_and_added():
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["rk4_renormalised", "rk8_renormalised"])
-def test_fall_from_far_away_is_last_bit_off_after_any_number_of_steps(name):
-    """Every method is exact for a parabola but for round-off, also that of the weights of rk8 in doubles."""
+def test_fall_from_far_away_has_error_of_last_bit_after_any_steps(name):
+    """Every method is exact for a parabola except for round-off, which includes that of rk8's weights."""
     h, start, speed, acceleration = 3.0 * 2.0**-15, 1000.1, 0.3, -0.7
     plain, compensated = [], []
     for n in (1000, 100_000):
@@ -113,8 +113,8 @@ def test_fall_from_far_away_is_last_bit_off_after_any_number_of_steps(name):
     assert plain[1] > 100.0
 
 
-def test_oscillator_is_off_by_round_off_of_its_rate_alone():
-    """Classical Runge-Kutta steps of a linear system are powers of a matrix; a sixth of h is a double."""
+def test_oscillator_error_is_round_off_of_its_rate():
+    """Runge-Kutta steps of a linear system are powers of a matrix; a sixth of h is a double."""
     h, n, p, start = 3.0 * 2.0**-13, 40_000, Spring(7.3), (0.7, -0.3)
     with mpmath.workdps(50):
         A = mpmath.matrix([[0, 1], [-mpmath.mpf(p.stiffness), 0]]) * mpmath.mpf(h)

@@ -1,4 +1,4 @@
-"""The fixed-point iteration ends where rounding, not the step, is what is left."""
+"""The fixed-point iteration ends when only rounding errors remain."""
 
 from typing import NamedTuple
 
@@ -27,8 +27,8 @@ RATES[LagParameters] = lag_rate
 
 
 @pytest.mark.parametrize("speed", [1.0, 330.0, 1e6])
-def test_large_numbers_that_cancel(speed):
-    # a rotor close to its speed: the difference of large numbers is all rounding
+def test_iteration_ends_when_large_numbers_cancel(speed):
+    # a rotor close to its final speed: the difference of large numbers is only rounding
     p, h, n = LagParameters(speed, 20.3), 4e-3, 500
     end = integrate_fixed(get("implicit_lie_midpoint").Method(), p, 0.0, LagState(speed * 1.001, 0.0), h, n)
     factor = (1 - 0.5 * h * p.rate) / (1 + 0.5 * h * p.rate)

@@ -1,4 +1,4 @@
-"""The energy-keeping method: closed form of the free body, and invariants over a long time."""
+"""Energy-conserving method: closed form of the free body, and invariants over a long time."""
 
 import math
 
@@ -16,7 +16,7 @@ P, START = FreeBodyParameters(INERTIA), RigidBody(exp((0.3, -0.2, 0.9)), OMEGA)
 
 
 def closed_form(t):
-    """omega_body(t) by Jacobi's elliptic functions (theory.md, eqs. (7.2) to (7.5)), for 2 T B < L^2."""
+    """Return omega_body(t) by Jacobi's elliptic functions (theory.md, eqs. (7.2) to (7.5)), for 2 T B < L^2."""
     a, b, c = INERTIA
     o1, o2, o3 = OMEGA
     energy, square = a * o1**2 + b * o2**2 + c * o3**2, (a * o1) ** 2 + (b * o2) ** 2 + (c * o3) ** 2
@@ -70,7 +70,7 @@ def test_momentum_is_exact_and_energy_has_no_drift():
     assert late < 2 * early + 1e-12
 
 
-def test_method_without_that_structure_does_drift():
+def test_method_without_splitting_drifts():
     _, states = simulate(get("rkmk4"), P, START, 0.1, 200_000, every=200)
     energy, _ = invariants(states)
     assert abs(energy[-1] / energy[0] - 1) > 1e-6

@@ -1,4 +1,4 @@
-"""Checked runs: closed forms, the controller's promises, and what is said about bad input."""
+"""Checked runs: closed forms, error control, and errors on bad input."""
 
 import math
 from typing import NamedTuple
@@ -29,13 +29,13 @@ def blow_up_rate(p, t, x):
 
 RATES[BlowUpParameters] = blow_up_rate
 
-# spinning about the symmetry axis while it precesses: everything is a cosine
+# spin about the symmetry axis with precession: all components are cosines
 TOP = FreeBodyParameters((1.0, 1.0, 2.0))
 START = RigidBody(NO_ROTATION, (0.3, 0.0, 1.0))
 
 
 def precession(t):
-    """omega_body of the symmetric free body: turns about z at (C - A) / A omega_z."""
+    """Return omega_body of the symmetric free body, which rotates about z at (C - A) / A omega_z."""
     rate = (2.0 - 1.0) / 1.0 * 1.0
     return np.column_stack([0.3 * np.cos(rate * t), 0.3 * np.sin(rate * t), np.ones_like(t)])
 
@@ -45,8 +45,8 @@ def test_adaptive_run_meets_its_tolerance_between_its_steps(tolerance):
     times = np.linspace(0.0, 10.0, 401)
     states, counts = solve(TOP, START, times, tolerance)
     assert abs(states[:, 4:] - precession(times)).max() < 20 * tolerance
-    assert counts["steps"] < 401 or tolerance < 1e-8  # output does not dictate the steps
-    # the attitude as well: the momentum stays put in the world
+    assert counts["steps"] < 401 or tolerance < 1e-8  # output times do not change the steps
+    # the attitude too: the momentum is constant in the world
     w, x, y, z = states[:, :4].T
     momentum = states[:, 4:] * TOP.inertia
     world_z = 2 * (x * z - w * y) * momentum[:, 0] + 2 * (y * z + w * x) * momentum[:, 1]
@@ -85,12 +85,12 @@ def test_nan_is_reported():
 
 
 @pytest.mark.parametrize("step", [0.0, -0.1, math.nan, math.inf])
-def test_bad_steps(step):
+def test_invalid_steps_are_rejected(step):
     with pytest.raises(ValueError, match=r"FreeBody: step .* must be positive and finite"):
         simulate(get("rk4"), TOP, START, step, 10)
 
 
-def test_bad_start_tolerance_and_times():
+def test_invalid_start_tolerance_and_times_are_rejected():
     with pytest.raises(ValueError, match=r"initial attitude is no rotation, off its manifold by 1: norm"):
         simulate(get("rk4"), TOP, RigidBody(Quaternion(2.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), 0.1, 10)
     with pytest.raises(ValueError, match=r"FreeBody: initial attitude is no rotation, all zero"):

@@ -50,7 +50,7 @@ def test_roll_pitch_yaw_round_trip(roll, pitch, yaw):
 @given(vector, vector)
 def test_product_rotate_and_matrix_agree(u, v):
     a, b = q.exp(u), q.exp(v)
-    # ten roundings a side; 2.2e-15 has been met
+    # ten roundings on each side; the largest measured error is 2.2e-15
     assert matrix(q.multiply(a, b)) == pytest.approx(matrix(a) @ matrix(b), abs=4e-15)
     assert q.rotate(a, v) == pytest.approx(apply(q.rotation_matrix(a), v), abs=2e-14)
     assert q.rotate_back(a, q.rotate(a, v)) == pytest.approx(v, abs=2e-14)

@@ -32,7 +32,7 @@ def ad(u):
 
 
 def dexp_reference(u):
-    """The series of ad^k / (k + 1)!, summed to 50 digits."""
+    """Return the series of ad^k / (k + 1)!, summed to 50 digits."""
     total = term = mpmath.eye(6)
     a = ad(u)
     for k in range(1, 90):

@@ -27,7 +27,7 @@ def hat(v):
 
 
 def in_hat(v, f0, f1, f2):
-    """f0 I + f1 hat + f2 hat^2 with scalar functions of the angle, 50 digits."""
+    """Return f0 I + f1 hat + f2 hat^2 with scalar functions of the angle, 50 digits."""
     a = mpmath.sqrt(mpmath.fsum(mpmath.mpf(c) ** 2 for c in v))
     h = hat(v)
     return f0(a) * mpmath.eye(3) + f1(a) * h + f2(a) * h * h
@@ -71,7 +71,7 @@ def test_log_undoes_exp_to_full_relative_accuracy(v):
     actual = so3.log(so3.exp(v))
     if abs(a - math.pi) < 1e-15:  # both signs of the half turn are right
         actual = [math.copysign(1.0, g * float(e)) * g for g, e in zip(actual, exact, strict=True)]
-    # beyond pi the matrix is rounded near the identity, which is what limits the difference
+    # beyond pi the matrix is rounded near the identity, which limits the accuracy
     allowed = 1e-14 * (abs(length - turns) if not turns else 1)
     assert worst(actual, exact) < allowed
 

@@ -1,4 +1,4 @@
-"""The action of SE(3) on TS^2: a group action, with the stated generator, that keeps both constraints."""
+"""Action of SE(3) on TS^2: group action, generator, and both constraints."""
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def test_constraints_hold_to_round_off_over_many_steps():
         assert abs(dot(x.direction, x.omega)) < 2e-16 * max(1.0, dot(x.omega, x.omega) ** 0.5) * 2
 
 
-def test_exponential_is_that_of_se3():
+def test_exponential_equals_that_of_se3():
     g = se3.exp((MU[1], MU[0]))
     y = ts2.retract(X, MU)
     assert y.direction == pytest.approx(so3.turn(MU[0], X.direction), abs=1e-15)

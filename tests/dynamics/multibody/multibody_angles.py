@@ -1,4 +1,4 @@
-"""States of bodies in Euler angles from those with quaternions, and back."""
+"""Conversion of body states between Euler angles and quaternions."""
 
 import numpy as np
 

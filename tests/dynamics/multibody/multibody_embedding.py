@@ -1,6 +1,6 @@
 """The embedding technique: equations of motion for the independent accelerations alone, without multipliers.
 
-A second way to the accelerations, sharing nothing with `augmented` but the rows; dense NumPy, for checks and studies.
+An independent method for the accelerations that shares only the rows with `augmented`; dense NumPy.
 """
 
 from typing import NamedTuple
@@ -23,14 +23,14 @@ class Reduced(NamedTuple):
 
     acceleration: np.ndarray  # (n, 6) of all coordinates
     independent: np.ndarray  # (f,) indices into the 6 n coordinates
-    velocity_map: np.ndarray  # (6 n, f): velocity = velocity_map @ velocity[independent] + what the drives impose
+    velocity_map: np.ndarray  # (6 n, f): velocity = velocity_map @ velocity[independent] + velocity imposed by drives
     mass: np.ndarray  # (f, f) reduced mass matrix
 
 
 def accelerations(system, configuration, velocity, wrench=None, drive=None) -> Reduced:
-    """Accelerations by coordinate partitioning of the index-1 equations (theory.md, eqs. (8.25)-(8.27)).
+    """Return accelerations by coordinate partitioning of the index-1 equations (theory.md, eqs. (8.25)-(8.27)).
 
-    Arguments and errors as `augmented.accelerations`.
+    See `augmented.accelerations` for arguments and errors.
     """
     configuration, velocity, wrench, drive = as_float_arrays(system, configuration, velocity, wrench, drive)
     p, e = rows(system.arrays, configuration, velocity, drive)
@@ -53,7 +53,7 @@ def accelerations(system, configuration, velocity, wrench=None, drive=None) -> R
 
 
 def mass_matrix(system, placement) -> np.ndarray:
-    """The assembled mass matrix, shape (6 n, 6 n), block diagonal (theory.md, eq. (8.5))."""
+    """Return the assembled mass matrix, shape (6 n, 6 n), block diagonal (theory.md, eq. (8.5))."""
     root, rotational = mass_roots(system.arrays, placement)
     out = np.zeros((6 * len(root), 6 * len(root)))
     for b in range(len(root)):

@@ -18,14 +18,14 @@ class Reaction(NamedTuple):
 
 
 def reactions(system, configuration, velocity, solution: Solution, drive=None) -> dict[str, Reaction]:
-    """Reaction of every joint by name (theory.md, eqs. (8.23), (8.24)).
+    """Return the reaction of every joint by name (theory.md, eqs. (8.23), (8.24)).
 
-    Single multipliers of redundant rows are only the shortest choice; their sum over a joint and its drive is unique.
+    Multipliers of redundant rows are only the shortest choice; their sum over a joint and its drive is unique.
     """
     configuration, velocity, _, drive = as_float_arrays(system, configuration, velocity, None, drive)
     p = place(configuration, velocity)
     refuse_singular(system, p.singular)
-    e = equations(system.arrays, p, drive)  # twist columns: forces and torques, whatever the coordinates
+    e = equations(system.arrays, p, drive)  # twist columns: forces and torques in all coordinates
     n = len(system.bodies)
     out = {}
     for k, joint in enumerate(system.joints):

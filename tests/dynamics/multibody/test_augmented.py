@@ -47,7 +47,7 @@ def state(rng):
 
 @pytest.mark.parametrize(("driven", "rank", "count"), [(True, 24, 32), (False, 20, 20)])
 def test_drone_against_dense_pseudo_inverse(driven, rank, count):
-    """30 coordinates, 32 rows of rank 24: unique accelerations, shortest multipliers; 10 freedoms undriven."""
+    """30 coordinates, 32 rows of rank 24: unique accelerations, shortest multipliers; 10 undriven freedoms."""
     rng = np.random.default_rng(5)
     for _ in range(5):
         drone, q, v, wrench, drive = state(rng)
@@ -69,7 +69,7 @@ def test_drone_against_dense_pseudo_inverse(driven, rank, count):
 
 
 def test_normal_equations_lose_digits_that_factorisation_keeps():
-    """The naive way, one LU of the assembled 62 x 62 matrix, is singular: it has no answer."""
+    """The baseline, one LU of the assembled 62 x 62 matrix, fails because the matrix is singular."""
     drone, q, v, wrench, drive = state(np.random.default_rng(8))
     system = drone_system(drone)
     p, e = rows(system.arrays, q, v, drive)
@@ -93,8 +93,8 @@ def test_embedding_technique_agrees_with_augmented_form(driven):
         np.testing.assert_allclose(second.acceleration / scale, first.acceleration / scale, atol=1e-12)
 
 
-def test_euler_angles_and_quaternions_give_same_motion():
-    """theta'' from the Euler form, taken to omega', equals the quaternion form's omega'."""
+def test_euler_angles_and_quaternions_have_same_motion():
+    """theta'' of the Euler form, converted to omega', equals omega' of the quaternion form."""
     rng = np.random.default_rng(7)
     for _ in range(5):
         drone, q, v, wrench, drive = state(rng)
@@ -129,7 +129,7 @@ def test_bricards_redundant_row_is_found():
 
 
 def test_contradicting_drives_are_reported():
-    """Two drives that impose different accelerations on the same pair: `conflict` tells."""
+    """`conflict` reports two drives that impose different accelerations on one pair."""
     drone, q, v, _, drive = state(np.random.default_rng(10))
     system = drone_system(drone)
     twice = type(system.drives[0])("second", 1, 0, (0.0, 0.0, 1.0))
@@ -148,7 +148,7 @@ def test_contradicting_drives_are_reported():
         (lambda q, v, w: (q, v * np.nan, w), "velocity holds a number that is not finite in row 0"),
     ],
 )
-def test_bad_arguments(change, message):
+def test_invalid_arguments_are_rejected(change, message):
     drone, q, v, wrench, drive = state(np.random.default_rng(11))
     with pytest.raises(ValueError, match=message):
         accelerations(drone_system(drone), *change(q, v, wrench), drive)

@@ -22,7 +22,7 @@ DRIVE = np.array([[2.0, 0.7], [-1.5, 0.4]])
 
 
 def state(kind):
-    """A random state, off all constraints."""
+    """Return a random state, off all constraints."""
     q = np.hstack([RNG.normal(size=(3, 3)), RNG.normal(size=(3, 4))])
     q[:, 3:] /= np.linalg.norm(q[:, 3:], axis=1)[:, None]
     v = RNG.normal(size=(3, 6))
@@ -36,7 +36,7 @@ def test_rows_are_derivatives_of_residuals(kind):
     h = 1e-5
 
     def at(t):
-        """The state on a smooth motion: second-order in t with the given velocity and acceleration."""
+        """Return the state at t of a second-order motion with this velocity and acceleration."""
         moved = add_increment(q, t * v + 0.5 * t * t * acceleration)
         speed = v + t * acceleration
         now = DRIVE + np.outer([t, t], [0.0, 0.0])
@@ -52,7 +52,7 @@ def test_rows_are_derivatives_of_residuals(kind):
     slip = velocity_defect(e, speed)
     np.testing.assert_allclose(slip[: len(rate)], rate, atol=1e-8)
     change = (velocity_defect(*equations(h)) - velocity_defect(*equations(-h))) / (2.0 * h)
-    # for quaternions the velocity is omega_body only to first order in t: the rows are linear in it, that is enough
+    # for quaternions the velocity is omega_body to first order in t, which suffices: the rows are linear in it
     expected = e.jacobian_t.T @ acceleration.ravel() - e.gamma
     np.testing.assert_allclose(change, expected, atol=1e-7)
 

@@ -1,4 +1,4 @@
-"""The drone in least coordinates against its five bodies, momentum theorems and bad numbers."""
+"""Drone in minimal coordinates against its five bodies and momentum theorems; invalid numbers."""
 
 import math
 
@@ -32,7 +32,7 @@ def loads(rng):
 
 @pytest.mark.long
 @pytest.mark.parametrize("driven", ["torque", "speed"])
-def test_least_coordinates_are_five_bodies(driven):
+def test_minimal_coordinates_equal_five_bodies(driven):
     rng = np.random.default_rng(51)
     drone = delivery_drone(**PAPER, driven=driven)
     for _ in range(20):
@@ -59,7 +59,7 @@ def test_least_coordinates_are_five_bodies(driven):
 
 
 def test_imposed_speed_and_drive_torque_are_inverse():
-    """The drive torque that an imposed acceleration needs, given as torque, produces that acceleration."""
+    """Applying the drive torque of an imposed acceleration produces that acceleration."""
     rng = np.random.default_rng(52)
     x, values = state(rng), loads(rng)
     imposed = solve(delivery_drone(**PAPER, driven="speed"), values, x)
@@ -70,7 +70,7 @@ def test_imposed_speed_and_drive_torque_are_inverse():
 
 
 def momentum(drone, x):
-    """Angular momentum about the common centre of mass, in the world; hubs are symmetric: the chassis' own."""
+    """Return the angular momentum about the common centre of mass, that of the chassis, in the world."""
     R = np.array(quaternion.rotation_matrix(x.attitude)).reshape(3, 3)
     w = np.array(x.omega_body)
     L = np.array(drone.inertia) * w
@@ -93,7 +93,7 @@ def test_free_flight_keeps_angular_momentum_under_motors():
 
 
 def test_hover():
-    """Thrust equal to the weight, pairs turning against each other: nothing moves, hinges carry thrust less weight."""
+    """With thrust equal to weight and counter-rotating pairs nothing moves; hinges carry thrust less weight."""
     drone = delivery_drone(**PAPER)
     mass = drone.mass + sum(drone.propeller_mass)
     x = DroneState((0.0,) * 3, quaternion.NO_ROTATION, (0.0,) * 3, (0.0,) * 3, ZERO4, (300.0, -300.0, 300.0, -300.0))
@@ -108,12 +108,12 @@ def test_hover():
 
 
 def without_propeller(drone, k):
-    """The drone after propeller k (0 to 3) was torn off; its angle and speed in the state mean nothing any more."""
+    """Return the drone after propeller k (0 to 3) was torn off; the state ignores its angle and speed."""
     return drone._replace(held=tuple(0.0 if i == k else held for i, held in enumerate(drone.held)))
 
 
 def test_detached_propeller_is_removed():
-    """Only its mass, thrust and torque are missing: the rest accelerates about the shifted centre of mass."""
+    """Only its mass, thrust and torque are absent: the remaining bodies accelerate about the shifted centre of mass."""
     rng = np.random.default_rng(54)
     drone = without_propeller(delivery_drone(**PAPER), 2)
     x, values = state(rng), loads(rng)
@@ -144,6 +144,6 @@ def test_detached_propeller_is_removed():
         ({"rotor_sign_x": (1, -1, 0, 1)}, r"must hold \+1 or -1"),
     ],
 )
-def test_bad_numbers(change, message):
+def test_invalid_numbers_are_rejected(change, message):
     with pytest.raises(ValueError, match=message):
         delivery_drone(**{**PAPER, **change})

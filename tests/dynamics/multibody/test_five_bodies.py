@@ -1,4 +1,4 @@
-"""The fast path on redundant states is the general path, to round-off, on and off the constraints."""
+"""The fast path on redundant states equals the general path to round-off, on and off the constraints."""
 
 import numpy as np
 import pytest
@@ -20,7 +20,7 @@ GRAVITY = (0.0, 0.0, -9.81)
 
 
 def scene(rng, driven):
-    """(drone, machine, five-body state, wrench, speeds, drive) at random."""
+    """Return a random (drone, machine, five-body state, wrench, speeds, drive)."""
     drone = delivery_drone(**PAPER, driven=driven)
     speeds, drive = rng.uniform(-400.0, 400.0, 4), rng.normal(size=4)
     wrench = rng.normal(size=(5, 6)) * [10, 10, 10, 1, 1, 1]
@@ -35,7 +35,7 @@ def scene(rng, driven):
 
 
 def general(drone, x, wrench, speeds, drive, driven, feedback=0.0):
-    """Solve with the general engine; a motor torque acts on propeller and chassis. `feedback` is Baumgarte's [1/s]."""
+    """Solve with the general engine; a motor torque acts on propeller and chassis. `feedback`: Baumgarte's [1/s]."""
     q, v = arrays(x)
     if driven == "speed":
         system, imposed = drone_system(drone), np.stack([speeds, drive], axis=1)
@@ -72,7 +72,7 @@ def test_identical_to_general_path(driven):
 
 @pytest.mark.parametrize("feedback", [0.0, 50.0])
 def test_identical_off_constraints_too(feedback):
-    """Index-1 equations hold wherever the integration has drifted to: hinges apart by 1 %; so does feedback of that."""
+    """Index-1 equations and their feedback also hold after drift, with hinges apart by 1 %."""
     rng = np.random.default_rng(32)
     for _ in range(20):
         drone, p, x, wrench, speeds, drive = scene(rng, "torque")
@@ -100,7 +100,7 @@ def test_reactions_are_multipliers():
 
 @pytest.mark.parametrize("driven", ["speed", "torque"])
 def test_torn_off_propeller_equals_general_engine(driven):
-    """The other three go on as a mechanism, it as a free body; nothing acts between the two parts any more."""
+    """The mechanism of three propellers and the free fourth one continue without forces between them."""
     rng = np.random.default_rng(34)
     for _ in range(10):
         drone, p, x, wrench, speeds, drive = scene(rng, driven)

@@ -1,4 +1,4 @@
-"""Projection and partitioning of the five bodies: consistent, momentum-keeping, of the integrator's order."""
+"""Projection and partitioning of the five bodies: consistency, conservation of momentum, order of the integrator."""
 
 import numpy as np
 import pytest
@@ -40,7 +40,7 @@ def imposed(p):
 
 @pytest.mark.long
 @pytest.mark.parametrize("driven", ["speed", "torque"])
-def test_projection_is_general_one(driven):
+def test_projection_equals_general_engine(driven):
     rng = np.random.default_rng(41)
     drone, p, x, *_ = scene(rng, driven)
     x = disturbed(x, 1e-5, rng)

@@ -1,4 +1,4 @@
-"""Initial states are made consistent, or refused with the violated rows named."""
+"""Initial states are made consistent, or rejected with the names of the violated rows."""
 
 import numpy as np
 import pytest

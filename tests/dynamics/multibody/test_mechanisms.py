@@ -1,4 +1,4 @@
-"""IFToMM benchmark mechanisms through the general engine, against closed forms of their one degree of freedom.
+"""IFToMM benchmark mechanisms in the general engine, against closed forms of their one degree of freedom.
 
 A01: elliptic integral. A02: the linkage is a pendulum, by any N. A04: the trihedral Bricard loop's closure
 cos a + cos b + cos a cos b = 0 (Chen, You, Tarnai, Int. J. Solids Structures 42 (2005) 2287, alpha = 90 degrees)
@@ -39,7 +39,7 @@ def test_a01_pendulum_period_and_energy():
 
 
 def a02_angle(n, speed, times):
-    """Crank angle from the upright: (inertia) theta'' = m g l (weight) sin(theta), integrated to 1e-13."""
+    """Return the crank angle from the upright: (inertia) theta'' = m g l (weight) sin(theta), integrated to 1e-13."""
     inertia = (n + 1) * (1.0 / 12.0 + 0.25) + n
     weight = G * ((n + 1) * 0.5 + n)
     result = solve_ivp(
@@ -57,7 +57,7 @@ def a02_angle(n, speed, times):
 def test_a02_four_bars_pass_their_singular_position():
     """The cranks turn over several times, twice a turn through the position with N more degrees of freedom.
 
-    The tip of the first crank (B0) is within the benchmark's 1e-3, far below, and the cranks stay parallel.
+    The tip of the first crank (B0) is well within the benchmark's 1e-3, and the cranks stay parallel.
     """
     n, end, steps = 2, 5.0, 2500
     system, q, v = four_bars(n)
@@ -77,7 +77,7 @@ AXES = np.array([(0, 1, 0), (0, 0, 1), (1, 0, 0), (0, 1, 0), (0, 0, 1), (1, 0, 0
 
 
 def bricard_at(fold):
-    """Middles of the rods (5, 3), last corner (3,), last axis (3,) and reduced inertia [kg m^2] of the loop whose odd
+    """Return rod centres (5, 3), last corner (3,), last axis (3,) and reduced inertia [kg m^2] of the loop whose odd
     hinges have turned by -`fold` from the cube: the even ones follow from the closure."""
     a = 0.5 * math.pi + fold
     b = math.acos(-math.cos(a) / (1.0 + math.cos(a)))
@@ -98,7 +98,7 @@ def bricard_at(fold):
 
 
 def test_a04_bricard_follows_its_closure_and_its_energy_integral():
-    """10 s of the benchmark: positions, speed and period of a loop that counts no freedom and has one redundant row."""
+    """10 s of the benchmark: positions, speed and period of a loop with one redundant row."""
     system, q, v = bricard()
     motion = simulate(system, q, v, 2e-3, 5000, record_every=20)
     assert drift(system, motion) < 1e-5

@@ -60,7 +60,7 @@ def test_accelerations_at_100_random_states():
 
 
 def test_five_seconds_of_tumbling():
-    """Both with their own RK4 at the same steps: they differ by no more than the step's error."""
+    """Both use RK4 with equal steps and differ by at most the error of the step."""
     drone = delivery_drone(**PAPER)
     x = DroneState(
         (0.0, 0.0, 10.0),

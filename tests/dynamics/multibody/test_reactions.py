@@ -23,7 +23,7 @@ def test_hanging_and_swinging_pendulum():
         r = reactions(system, down, v, solution)["hinge"]
         np.testing.assert_allclose(r.force_world, [0.0, force, 0.0], atol=1e-9)
         np.testing.assert_allclose(r.torque_world, 0.0, atol=1e-9)
-    # released at rest, all of the weight accelerates: the hinge carries nothing (but the trace of inertia's share)
+    # released at rest, the weight only accelerates: the hinge carries nothing (except the small share of inertia)
     r = reactions(system, q, 0 * v, accelerations(system, q, 0 * v))["hinge"]
     np.testing.assert_allclose(r.force_world, 0.0, atol=1e-7)
 

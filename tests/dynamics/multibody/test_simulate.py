@@ -1,4 +1,4 @@
-"""The general engine in time: order, energy, the four stabilisations, both coordinates, and the errors."""
+"""Time integration in the general engine: order, energy, four stabilisations, both coordinates, and errors."""
 
 import numpy as np
 import pytest
@@ -54,14 +54,14 @@ def test_euler_and_quaternion_coordinates_fly_alike(stabilisation, driven):
     assert max(first.velocity_defect[-1], second.velocity_defect[-1]) < 1e-10
 
 
-def test_energy_is_that_of_bodies():
+def test_energy_equals_sum_over_bodies():
     system, q, v = four_bars(2, speed=1.0)
     kinetic, potential = energy(system, q, v)
     assert kinetic == pytest.approx(0.5 * (3.0 / 3.0 + 2.0))  # three cranks about their ends, two couplers
     assert potential == pytest.approx(9.81 * (3 * 0.5 + 2))
 
 
-def test_errors():
+def test_invalid_arguments_are_rejected():
     system, q, v = four_bars()
     with pytest.raises(ValueError, match="unknown stabilisation 'glue': choose one of none, partitioning"):
         simulate(system, q, v, 1e-3, 1, "glue")

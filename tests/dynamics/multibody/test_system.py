@@ -1,4 +1,4 @@
-"""Descriptions that no mechanism has are refused with one clear line."""
+"""Impossible descriptions of mechanisms are rejected in one line."""
 
 import numpy as np
 import pytest
@@ -42,7 +42,7 @@ def test_triad_is_right_handed_and_ends_on_axis(axis):
         ([BAR], [], [DrivingConstraint("motor", 0, -1, (0, 0, 0))], "motor: axis_j must be a direction"),
     ],
 )
-def test_impossible_parts_are_refused(bodies, joints, drives, message):
+def test_impossible_parts_are_rejected(bodies, joints, drives, message):
     with pytest.raises(ValueError, match=message):
         assemble(bodies, joints, drives)
 

@@ -1,4 +1,4 @@
-"""Closed form of a free body that meets a spring with a damper which pushes and does not pull."""
+"""Closed form of a free body that hits a damped spring which only pushes."""
 
 import math
 

@@ -1,4 +1,4 @@
-"""Airframe files: what is refused, and how the message reads."""
+"""Airframe files: rejected files and error messages."""
 
 from pathlib import Path
 
@@ -49,6 +49,6 @@ def test_invalid_file_error_names_file_and_key(tmp_path, old, new, expected):
     assert expected in message
 
 
-def test_missing_file(tmp_path):
+def test_missing_file_is_rejected(tmp_path):
     with pytest.raises(ValueError, match=r"none.toml: cannot be read"):
         load_airframe(tmp_path / "none.toml")

@@ -1,4 +1,4 @@
-"""Faults and gusts between two ticks against SciPy's DOP853, which is split at their edges."""
+"""Faults and gusts between two ticks against SciPy's DOP853, split at their edges."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -37,7 +37,7 @@ def fly(tables, start, voltage=VOLTAGE, integrator="rk4_renormalised"):
 
 
 def broken_by_reference(p):
-    """Return the coordinates after damage and release, each part integrated on its own."""
+    """Return the coordinates after damage and release, each part integrated separately."""
     by_name = dict(zip(sorted(BROKEN), p.effects, strict=True))
     gravity, rotor, box = by_name["gravity"], by_name["rotor_thrust"], by_name["payload_release"]
     damage = by_name["rotor_damage"]
@@ -73,7 +73,7 @@ def test_fault_on_tick_takes_effect_there():
     ("start", "duration"), [(0.0123, 0.0007), (0.0507, 0.0301), (0.0, 0.02)], ids=["short", "long", "on ticks"]
 )
 def test_gust_between_ticks_is_exact(start, duration):
-    """Drag of a body that falls upright without rotors: two numbers, SciPy split at the gust's edges."""
+    """The reference for an upright fall without rotors is SciPy with two states, split at the gust's edges."""
     peak = np.array([40.0, 0.0, -15.0])
     tables = {"body_drag": {"linear": [1.5, 0.5, 0.8]}, "gravity": {}, "rotor_thrust": {}}
     tables["wind_gust"] = {"peak": peak.tolist(), "start": start, "duration": duration}

@@ -1,4 +1,4 @@
-"""Controllers of the cooperative load: each undone by the equations of motion, and the published flight."""
+"""Controllers of the cooperative load against the equations of motion and the published flight."""
 
 import math
 
@@ -26,13 +26,13 @@ G = 9.81
 
 
 def link(angle_deg):
-    """Direction from quadrotor to load, `angle` from the downward vertical in the x-z plane."""
+    """Return the direction from quadrotor to load, `angle` from the downward vertical in the x-z plane."""
     a = math.radians(angle_deg)
     return (math.sin(a), 0.0, -math.cos(a))
 
 
 def published():
-    """Two quadrotors, 5 s; the example's third axis points down, so y and z change sign in ENU."""
+    """Return the published case of two quadrotors; its third axis points down, so y and z change sign in ENU."""
     law = FormationControl(
         12.0, 5.0, 16.0, 5.0, 9.0, 3.0, 0.9,
         ((-2.5, 0.0, 7.0 - 2.5**2), (1.0, 0.0, 5.0), (0.0, 0.0, -1.0)),
@@ -46,7 +46,7 @@ def published():
 
 
 def tripod():
-    """Three quadrotors around the load, whose links span space, swinging."""
+    """Return a swinging system of three quadrotors whose links span space."""
     spread = [(0.5 * math.cos(a), 0.5 * math.sin(a), -math.sqrt(0.75)) for a in (0.0, 2.1, 4.2)]
     p, _ = published()
     law = p.drive._replace(direction=tuple(spread))
@@ -57,7 +57,7 @@ def tripod():
     )
 
 
-def test_desired_path_is_published_one():
+def test_desired_path_equals_published_path():
     p, _ = published()
     for t in (0.0, 1.3, 5.0):
         position, velocity, acceleration = forces_of.desired_load(p.drive.path, t)
@@ -78,7 +78,7 @@ def test_desired_forces_produce_desired_motion():
     expected, pairs = forces(p, 0.3, x)
     force = tuple(f for f, _ in pairs)
     specific = load_acceleration(p, x, force)
-    # the damping of the shares leaves a part of second order
+    # the damping of the shares leaves a second-order term
     assert specific == pytest.approx(expected, abs=0.03 * max(map(abs, expected)))
     for i in range(3):
         q, omega = x.link[i].direction, x.link[i].omega
@@ -104,7 +104,7 @@ def test_derivatives_of_desired_forces_along_motion():
         assert actual == pytest.approx((np.array(a) - b) / (2 * h), rel=1e-6, abs=1e-6)
 
 
-def test_wanted_attitude_and_its_rate():
+def test_desired_attitude_and_its_rate():
     force, force_rate, h = np.array((1.0, -2.0, 7.0)), np.array((0.5, 0.3, -1.0)), 1e-6
     matrix, omega = forces_of.desired_attitude(tuple(force), tuple(force_rate))
     m = np.array(matrix).reshape(3, 3)

@@ -1,4 +1,4 @@
-"""Cooperative load: an independent constrained formulation, invariants, and the controllers on the published case."""
+"""Cooperative load against an independent constrained formulation, and invariants."""
 
 import numpy as np
 import pytest
@@ -23,7 +23,7 @@ G = 9.81
 
 
 def swinging(n, seed=0):
-    """A start in general position, spinning and swinging."""
+    """Return a spinning and swinging start in general position."""
     rng = np.random.default_rng(seed)
     v = lambda s: tuple(map(float, s * rng.standard_normal(3)))  # noqa: E731
     return CooperativeLoadState(
@@ -44,7 +44,7 @@ def pushing(n):
 
 
 def constrained_accelerations(p, x):
-    """Newton for free particles held by |r_i - y| = L_i: accelerations by Lagrange multipliers, no sphere involved."""
+    """Return accelerations of particles constrained by |r_i - y| = L_i, by Lagrange multipliers, without spheres."""
     n = len(x.link)
     mass = np.repeat([p.load_mass, *p.quad_mass], 3)
     y, v = np.array(x.load_position), np.array(x.load_velocity)
@@ -62,7 +62,7 @@ def constrained_accelerations(p, x):
 
 
 @pytest.mark.parametrize("n", [2, 3])
-def test_accelerations_are_those_of_constrained_particles(n):
+def test_accelerations_equal_those_of_constrained_particles(n):
     p = system(n, pushing(n))
     for seed in range(3):
         x = swinging(n, seed)
@@ -80,7 +80,7 @@ def test_whole_flight_agrees_with_constrained_formulation():
     p, x0 = system(2, pushing(2)), swinging(2, 5)
     _, states = simulate(get("rkmk4"), p, x0, 1e-3, 1000, every=1000)
     end = unflatten(x0, tuple(map(float, states[-1])))
-    # particles and bodies apart, joined by multipliers; attitudes as nine numbers
+    # separate particles and bodies, joined by multipliers; attitudes as nine numbers
     start = [x0.load_position, *(quad_position(p, x0, i) for i in range(2))]
     speed = [x0.load_velocity, *(quad_velocity(p, x0, i) for i in range(2))]
     turned = [np.array(rotation_matrix(q)).reshape(3, 3) for q in x0.attitude]

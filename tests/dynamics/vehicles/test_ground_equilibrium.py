@@ -1,4 +1,4 @@
-"""Rest on level ground, on a slope, between bumps."""
+"""Resting pose on level ground, on a slope and between bumps."""
 
 import math
 
@@ -40,7 +40,7 @@ UNEVEN = [(0.2, 0.2, -0.30), (-0.2, 0.2, -0.35), (-0.2, -0.2, -0.35), (0.25, -0.
 
 
 @pytest.mark.parametrize("slope", [(0.0, 0.0), (0.1, 0.0), (-0.2, 0.3)])
-def test_of_uneven_feet_three_around_centre_of_mass_touch(slope):
+def test_three_uneven_feet_around_centre_of_mass_touch(slope):
     R, heights = clearances(UNEVEN, relief(slope=slope))
     assert heights.min() > -1e-12
     assert np.sort(heights)[2] < 1e-12
@@ -50,7 +50,7 @@ def test_of_uneven_feet_three_around_centre_of_mass_touch(slope):
     assert math.atan2(R[1, 0], R[0, 0]) == pytest.approx(0.0, abs=1e-12)
 
 
-def test_three_feet_of_unequal_height_give_tilt_in_closed_form():
+def test_tilt_on_three_unequal_feet_follows_closed_form():
     R, heights = clearances([(0.2, 0.0, -0.30), (-0.2, 0.1, -0.35), (-0.2, -0.1, -0.35)])
     assert abs(heights).max() < 1e-12
     assert math.atan2(-R[2, 0], R[2, 2]) == pytest.approx(math.atan2(0.05, 0.4), abs=1e-12)  # nose down

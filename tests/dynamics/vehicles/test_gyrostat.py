@@ -1,4 +1,4 @@
-"""Gyrostat: the published equations component by component, its invariants, its four cases and its attitude control."""
+"""Gyrostat against the published equations; invariants, four published cases and attitude control."""
 
 import math
 
@@ -21,7 +21,7 @@ START = RigidBody(NO_ROTATION, (0.1, 0.1, 0.1))
 
 
 def published(t, o, p):
-    """The three scalar equations, time in minutes."""
+    """Return the rates of the three scalar equations, time in minutes."""
     a, b, c = p.inertia
     h1, h2, h3 = p.rotor_momentum
     (x, y, z), f, w = o, p.forcing_amplitude, p.forcing_frequency
@@ -46,7 +46,7 @@ def published(t, o, p):
 @pytest.mark.parametrize(
     "p", [GE_LIN, CHAOTIC, BLOCKED, GE_LIN._replace(desired_rate=0.7, inertia=(400.0, 520.0, 900.0))]
 )
-def test_rate_is_published_one(p):
+def test_rate_equals_published_equations(p):
     for t, o in ((0.0, (0.1, 0.1, 0.1)), (2.3, (-0.4, 1.2, 0.6))):
         actual = rate(p, t, RigidBody(NO_ROTATION, o))
         assert actual.omega_body == pytest.approx(published(t, o, p), rel=1e-14)
@@ -60,7 +60,7 @@ def world_momentum(states, h=ZERO):
     return momentum + w * t + np.cross(u, t)
 
 
-def test_blocked_rotors_are_free_body():
+def test_blocked_rotors_equal_free_body():
     _, one = simulate(get("rkmk4"), BLOCKED, START, 0.01, 1000, every=100)
     _, two = simulate(get("rkmk4"), FreeBodyParameters(INERTIA), START, 0.01, 1000, every=100)
     assert (one == two).all()
@@ -86,7 +86,7 @@ def test_uneven_rotors_keep_momentum_without_friction():
     assert abs(total - total[0]).max() < 1e-8 * np.linalg.norm(total[0])
 
 
-def test_friction_takes_energy():
+def test_friction_dissipates_energy():
     p = CHAOTIC._replace(forcing_amplitude=0.0)
     _, states = simulate(get("rkmk4"), p, START, 0.01, 5000, every=50)
     energy = (states[:, 4:] ** 2 * INERTIA).sum(axis=1)
@@ -94,7 +94,7 @@ def test_friction_takes_energy():
     assert energy[-1] < 0.9 * energy[0]
 
 
-def test_neighbouring_starts_part_only_in_chaotic_case():
+def test_neighbouring_starts_diverge_only_in_chaotic_case():
     near = RigidBody(NO_ROTATION, (0.1 + 1e-9, 0.1, 0.1))
     strong = GE_LIN._replace(linear_gain=(100.0, 100.0, 100.0))
     growth = {}

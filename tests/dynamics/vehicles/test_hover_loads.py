@@ -34,7 +34,7 @@ def test_battery_current_closes_circuit():
     assert hover_loads.battery_margin(DRONE) == pytest.approx(1.0 - current / limit)
 
 
-def test_battery_that_cannot_give_power_is_named():
+def test_battery_with_too_little_power_is_named():
     weak = DRONE.battery.model_copy(update={"cell_resistance": 1.0})
     with pytest.raises(ValueError, match="the battery cannot give"):
         hover_loads.current(DRONE.model_copy(update={"battery": weak}))

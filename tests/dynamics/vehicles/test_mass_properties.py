@@ -1,4 +1,4 @@
-"""Products of inertia and a centre of mass off the origin, against the same body described along other axes."""
+"""Products of inertia and an offset centre of mass against the same body in other axes."""
 
 import numpy as np
 import pytest
@@ -53,7 +53,7 @@ def test_inverse_inertia_with_and_without_products():
     ("products", "message"),
     [((0.4, 0.0, 0.0), "products: .* principal moment"), ((0.0, 0.0, 0.15), "triangle inequality")],
 )
-def test_matrix_that_no_body_has_is_refused(products, message):
+def test_impossible_inertia_matrix_is_rejected(products, message):
     with pytest.raises(ValueError, match=message):
         Mass(total=1.0, payload=0.0, inertia=(0.27, 0.26, 0.42), products=products)
 
@@ -69,7 +69,7 @@ def test_positions_are_moved_to_centre_of_mass_once():
 
 
 def test_hover_thrusts_balance_offset_centre_of_mass():
-    """The least thrusts that carry W without a torque: F = W / 4 (1 + (c . r) / l^2), r from the hubs' centre."""
+    """The smallest thrusts without torque are F = W / 4 (1 + (c . r) / l^2), r from the hubs' centre."""
     c, arm = 0.017, 0.35171491
     flight = lapwing.fly("hover", {"airframe.mass.centre": [c, 0.0, 0.0], "run.duration": 5.5})
     thrust = flight.truth.rotor_thrust[flight.truth.times > 5.0].mean(axis=0)

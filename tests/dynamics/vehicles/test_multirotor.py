@@ -1,4 +1,4 @@
-"""The bare plant against closed forms and an independent implementation."""
+"""Plant without effects against closed forms and an independent implementation."""
 
 import math
 from pathlib import Path
@@ -86,7 +86,7 @@ def test_torque_free_rotation_keeps_momentum_and_energy():
 
 
 def test_agrees_with_independent_implementation():
-    """Newton-Euler with a rotation matrix and full inertia tensor, in scipy's eighth-order method."""
+    """The reference is Newton-Euler with a rotation matrix and full inertia tensor in SciPy's eighth-order method."""
     voltage = np.array([33.0, 30.0, 34.0, 32.0])
     position = np.array(DRONE.rotors.position)
     inertia, mass = np.diag(DRONE.mass.inertia), DRONE.mass.total
@@ -130,7 +130,7 @@ def test_converges_with_fourth_order():
     assert np.log2(np.divide(error[:-1], error[1:])) == pytest.approx(4.0, abs=0.3)
 
 
-def test_two_intervals_are_one_of_twice_length():
+def test_two_intervals_equal_one_of_twice_length():
     voltage = (33.0, 30.0, 34.0, 32.0)
     state = start((0.1, 0.2, 0.3), speed=300.0)
     half = multirotor.advance(RK4, BARE, KEY, 0, state, voltage, 1e-3, 4)
@@ -154,7 +154,7 @@ def test_observed_acceleration_is_slope_of_velocity():
 
 
 def test_current_and_power_at_hover():
-    """Shaft power of the static propeller plus idle losses; the motor constant is 60 / (2 pi KV) V s/rad."""
+    """Power is shaft power of the static propeller plus idle losses; the motor constant is 60 / (2 pi KV) V s/rad."""
     o = multirotor.observe(BARE, 0, 0.004, start(speed=HOVER_SPEED), (HOVER_VOLTAGE,) * 4)
     shaft = o.torque[0] * HOVER_SPEED
     constant = 60.0 / (2.0 * math.pi * 150.0)

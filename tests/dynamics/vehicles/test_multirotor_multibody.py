@@ -1,4 +1,4 @@
-"""Five bodies under the effects of a scene: with symmetric propellers they are the reduced model, else they wobble."""
+"""Five bodies with effects: symmetric propellers reproduce the reduced model, uneven ones wobble."""
 
 import math
 from pathlib import Path
@@ -33,7 +33,7 @@ SYMMETRIC = with_blades(4.349e-4, 4.349e-4)
 
 
 def reduced():
-    """One rigid body with the mean inertia of all five."""
+    """Return one rigid body with the mean inertia of all five."""
     p = multirotor.parameters(SYMMETRIC, ACTIVE)
     rotors, inertia = DRONE.rotors, np.array(DRONE.mass.inertia)
     for hub in np.array(rotors.position):
@@ -63,17 +63,17 @@ def reference():
 
 @pytest.mark.long
 @pytest.mark.parametrize("stabilisation", ["projection", "partitioning", "baumgarte", "none"])
-def test_symmetric_propellers_at_imposed_speed_are_reduced_model(reference, stabilisation):
+def test_symmetric_propellers_at_imposed_speed_equal_reduced_model(reference, stabilisation):
     p = multirotor_multibody.parameters(SYMMETRIC, ACTIVE, "speed", stabilisation)
     start = multirotor_multibody.initial_state(p, (0.0, 0.0, 10.0), ATTITUDE, SPEED, omega_body=OMEGA)
-    # feedback turns the drift that the integration leaves into motion of the chassis: half the step for the same error
+    # feedback converts drift of the integration into motion of the chassis: half the step for the same error
     ours = looked(p, fly(p, start, 0.2, 1.25e-4 if stabilisation == "baumgarte" else 2.5e-4).motion)
     for name in reference._fields:
         np.testing.assert_allclose(getattr(ours, name), getattr(reference, name), rtol=1e-7, atol=2e-8, err_msg=name)
 
 
 def hovering(blades, drive, omega=(0.0, 0.0, 0.0)):
-    """(parameters, state turning at omega, voltages that keep the rotors at SPEED)."""
+    """Return (parameters, state with rate omega, voltages that hold the rotors at SPEED)."""
     p = multirotor_multibody.parameters(blades, ACTIVE, drive)
     state = multirotor_multibody.initial_state(p, (0.0, 0.0, 10.0), NO_ROTATION, SPEED, omega_body=omega)
     return p, state, (SPEED * DRONE.motor.rotor_constant,) * 4
@@ -81,7 +81,7 @@ def hovering(blades, drive, omega=(0.0, 0.0, 0.0)):
 
 @pytest.mark.long
 def test_uneven_propellers_wobble_at_twice_their_speed():
-    """Turning about x only, the momentum about x is kept: w (I + 4 half cos 2 phi) = constant (eq. (8.50))."""
+    """In rotation about x the momentum about x is constant: w (I + 4 half cos 2 phi) = constant (eq. (8.50))."""
     p, state, volts = hovering(DRONE, "speed", (0.5, 0.0, 0.0))
     along, across = DRONE.rotors.blade_inertia
     hubs = np.array(DRONE.rotors.position)
@@ -92,7 +92,7 @@ def test_uneven_propellers_wobble_at_twice_their_speed():
         state = multirotor.advance(RK4, p, KEY, i - 1, state, volts, h, n)
         expected = 0.5 * (mean + swing) / (mean + swing * math.cos(2.0 * SPEED * i * n * h))
         assert looked(p, state.motion).omega_body == pytest.approx((expected, 0.0, 0.0), abs=1e-6)
-    assert abs(2.0 * swing / mean) > 5e-3  # what the reduced model does not have, relative to its rate
+    assert abs(2.0 * swing / mean) > 5e-3  # the wobble, absent in the reduced model, relative to its rate
 
 
 @kernel

@@ -1,4 +1,4 @@
-"""A propeller that locks, turns free or is torn off in flight: nothing from outside acts, so momenta are kept."""
+"""A propeller locks, turns freely or is torn off in flight without external loads: momenta are constant."""
 
 from pathlib import Path
 
@@ -41,19 +41,19 @@ def on_se3(x):
 
 
 @kernel
-def seen(p, x):
+def motion_from(p, x):
     return multirotor_equations.motion_of(p.layout, x)
 
 
 @kernel
-def struck(p, state, volts):
+def apply_impulse(p, state, volts):
     return multirotor_multibody_equations.apply_constraint_impulse(
         MultirotorDrive(p, p.body, state.memory, volts), state.motion
     )
 
 
 @kernel
-def euler_struck(p, state, volts):
+def apply_euler_impulse(p, state, volts):
     return multirotor_euler.apply_constraint_impulse(MultirotorDrive(p, p.body, state.memory, volts), state.motion)
 
 
@@ -68,7 +68,7 @@ def bodies(x):
 
 
 def spin(p, b):
-    """Angular momentum of each body about its own centre of mass, in the world, shape (5, 3)."""
+    """Return the angular momentum of each body about its centre of mass, in the world, shape (5, 3)."""
     d = p.layout.bodies.drone
     moments = np.array([d.inertia, *d.propeller_inertia])
     turned = [np.array(rotation_matrix(q.attitude)).reshape(3, 3) for q in b]
@@ -76,7 +76,7 @@ def spin(p, b):
 
 
 def momenta(p, x):
-    """(linear, angular about the origin) of the five bodies, shape (6,)."""
+    """Return (linear, angular about the origin) momenta of the five bodies, shape (6,)."""
     d, b = p.layout.bodies.drone, bodies(x)
     masses = np.array([d.mass, *d.propeller_mass])
     linear = masses[:, None] * [q.velocity_world for q in b]
@@ -84,7 +84,7 @@ def momenta(p, x):
     return np.concatenate([linear.sum(axis=0), angular.sum(axis=0)])
 
 
-def flown(p, state, ticks, begin=0, volts=VOLTS, method=RK4):
+def fly(p, state, ticks, begin=0, volts=VOLTS, method=RK4):
     for tick in range(begin, begin + ticks):
         state = multirotor.advance(method, p, (0, 0), tick, state, volts, H, N)
     return state
@@ -94,7 +94,7 @@ def before(coordinates, drive):
     form = FORMS[coordinates]
     p = form.parameters(DRONE, (), drive)
     start = form.initial_state(p, (0.0, 0.0, 0.0), ATTITUDE, SPEED, VELOCITY, OMEGA)
-    return form, p, start, flown(p, start, 10)
+    return form, p, start, fly(p, start, 10)
 
 
 @pytest.mark.parametrize("coordinates", FORMS)
@@ -106,62 +106,62 @@ def test_momentum_is_kept_across_event(coordinates, drive, becomes):
     kept = momenta(p, state.motion)
     assert np.abs(kept - momenta(p, start.motion)).max() < 1e-7
     if becomes == "locked":
-        strike = struck if coordinates == "se3" else euler_struck
+        strike = apply_impulse if coordinates == "se3" else apply_euler_impulse
         state = state._replace(motion=strike(after, state, VOLTS))
         assert np.abs(momenta(after, state.motion) - kept).max() < 1e-11
-    end = flown(after, state, 10, 10)
+    end = fly(after, state, 10, 10)
     assert np.abs(momenta(after, end.motion) - kept).max() < 1e-7
 
 
 def test_locked_propeller_transfers_spin_to_chassis():
-    """The naive way, which just stops it, loses the spin."""
+    """The baseline, which only stops the propeller, loses the spin."""
     _, p, _, state = before("se3", "torque")
     after = multirotor_multibody.with_propeller_failure(p, 1, "locked")
-    speed = seen(p, state.motion).rotor_speed[1]
-    motion = struck(after, state, VOLTS)
-    assert seen(after, motion).rotor_speed[1] == pytest.approx(0.0, abs=1e-11)
+    speed = motion_from(p, state.motion).rotor_speed[1]
+    motion = apply_impulse(after, state, VOLTS)
+    assert motion_from(after, motion).rotor_speed[1] == pytest.approx(0.0, abs=1e-11)
     assert np.abs(np.subtract(motion.chassis.omega_body, state.motion.chassis.omega_body))[2] > 0.5 * IZ * speed / 0.5
     old = state.motion.propellers[1]
     still = old._replace(omega_body=(*old.omega_body[:2], state.motion.chassis.omega_body[2]))
-    naive = state.motion._replace(propellers=(state.motion.propellers[0], still, *state.motion.propellers[2:]))
-    lost = np.linalg.norm((momenta(p, naive) - momenta(p, state.motion))[3:])
+    baseline = state.motion._replace(propellers=(state.motion.propellers[0], still, *state.motion.propellers[2:]))
+    lost = np.linalg.norm((momenta(p, baseline) - momenta(p, state.motion))[3:])
     assert lost == pytest.approx(IZ * abs(speed), rel=1e-6)
-    end = flown(after, state._replace(motion=motion), 20, 10).motion
-    assert seen(after, end).rotor_speed[1] == pytest.approx(0.0, abs=1e-9)
-    assert np.abs(seen(after, end).rotor_speed)[[0, 2, 3]].min() > SPEED
+    end = fly(after, state._replace(motion=motion), 20, 10).motion
+    assert motion_from(after, end).rotor_speed[1] == pytest.approx(0.0, abs=1e-9)
+    assert np.abs(motion_from(after, end).rotor_speed)[[0, 2, 3]].min() > SPEED
 
 
 @pytest.mark.parametrize("drive", ["torque", "speed"])
 def test_free_propeller_keeps_its_spin_without_air(drive):
-    """The naive way, a motor without voltage, brakes it."""
+    """The baseline, a motor without voltage, brakes the propeller."""
     _, p, _, state = before("se3", drive)
     after = multirotor_multibody.with_propeller_failure(p, 1, "free")
-    end = flown(after, state, 20, 10)
+    end = fly(after, state, 20, 10)
     axial = [bodies(x)[2].omega_body[2] for x in (state.motion, end.motion)]
-    # uneven blades trade a trace of it with the body rates
+    # uneven blades exchange a little of it with the body rates
     assert axial[1] == pytest.approx(axial[0], rel=1e-4)
-    assert seen(after, end.motion).rotor_speed[3] > seen(after, state.motion).rotor_speed[3] + 10.0
+    assert motion_from(after, end.motion).rotor_speed[3] > motion_from(after, state.motion).rotor_speed[3] + 10.0
     assert hinges(after, end.motion, VOLTS)[2][1][2] == pytest.approx(0.0, abs=1e-12)
-    naive = flown(p, state, 20, 10, (VOLTS[0], 0.0, *VOLTS[2:]))
-    assert seen(p, naive.motion).rotor_speed[1] < 0.8 * SPEED
+    baseline = fly(p, state, 20, 10, (VOLTS[0], 0.0, *VOLTS[2:]))
+    assert motion_from(p, baseline.motion).rotor_speed[1] < 0.8 * SPEED
 
 
 @pytest.mark.parametrize("coordinates", FORMS)
-def test_of_torn_off_propeller_constraint_rows_vanish(coordinates):
-    """It flies straight and keeps its own spin; nothing acts at its hinge; the others are still held. The naive way,
-    a propeller that gives no thrust any more, stays where it is."""
+def test_torn_off_propeller_has_no_constraint_rows(coordinates):
+    """The propeller flies straight and keeps its spin without a hinge force; the others are held. In the baseline,
+    a propeller without thrust, it stays in its place."""
     form, p, _, state = before(coordinates, "speed")
     after = form.with_propeller_failure(p, 1, "torn_off")
     if coordinates == "euler":
         arrays = after.layout.bodies.arrays
         assert (len(arrays.joint_bodies), len(arrays.drive_bodies)) == (3, 3)
-    end = flown(after, state, 20, 10)
+    end = fly(after, state, 20, 10)
     t = 20 * N * H
     b, e = bodies(state.motion), bodies(end.motion)
     straight = np.array(b[2].position_world) + t * np.array(b[2].velocity_world)
     np.testing.assert_allclose(e[2].position_world, straight, atol=1e-12)
     np.testing.assert_allclose(spin(p, e)[2], spin(p, b)[2], atol=1e-7)
-    assert seen(after, end.motion).rotor_speed[1] == 0.0
+    assert motion_from(after, end.motion).rotor_speed[1] == 0.0
     if coordinates == "se3":
         forces = hinges(after, end.motion, VOLTS)
         assert forces[2] == ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -173,15 +173,15 @@ def test_of_torn_off_propeller_constraint_rows_vanish(coordinates):
     ]
     assert np.abs([gap[k] for k in (0, 2, 3)]).max() < 1e-10
     assert np.abs(gap[1]).max() > 1e-4
-    naive = bodies(flown(form.with_propeller_failure(p, 1, "free"), state, 20, 10).motion)
-    assert np.abs(np.subtract(naive[2].position_world, straight)).max() > 1e-4
+    baseline = bodies(fly(form.with_propeller_failure(p, 1, "free"), state, 20, 10).motion)
+    assert np.abs(np.subtract(baseline[2].position_world, straight)).max() > 1e-4
 
 
 def test_detachment_is_equal_in_both_coordinates():
     ends = []
     for coordinates in FORMS:
         form, p, _, state = before(coordinates, "torque")
-        ends.append(bodies(flown(form.with_propeller_failure(p, 1, "torn_off"), state, 10, 10).motion))
+        ends.append(bodies(fly(form.with_propeller_failure(p, 1, "torn_off"), state, 10, 10).motion))
     for one, other in zip(*ends, strict=True):
         np.testing.assert_allclose(one.position_world, other.position_world, atol=1e-8)
         np.testing.assert_allclose(rotation_matrix(one.attitude), rotation_matrix(other.attitude), atol=1e-5)
@@ -192,7 +192,7 @@ def test_detached_propeller_has_no_thrust():
     p = multirotor_multibody.with_propeller_failure(multirotor_multibody.parameters(DRONE, active), 1, "torn_off")
     state = multirotor_multibody.initial_state(p, (0.0, 0.0, 10.0), rotor_speed=SPEED)
     assert multirotor.observe(p, 0, H, state, VOLTS).thrust[1] == 0.0
-    end = flown(p, state, 50)
+    end = fly(p, state, 50)
     fallen = np.subtract(bodies(end.motion)[2].position_world, bodies(state.motion)[2].position_world)
     np.testing.assert_allclose(fallen, (0.0, 0.0, -0.5 * 9.80665 * (50 * N * H) ** 2), atol=1e-12)
 
@@ -215,7 +215,7 @@ def bodies_of(x, y):
 
 
 def by_dop853(p, state, duration):
-    """The bodies after `duration` by SciPy, from the tangent; quaternions as plain numbers, q' = q (0, omega)/2."""
+    """Return the bodies after `duration`, by SciPy from the tangent, with quaternions q' = q (0, omega)/2."""
 
     def rate(_, y):
         x = bodies_of(state.motion, y)
@@ -239,24 +239,24 @@ def test_failures_between_ticks_equal_split_reference(becomes):
     second = multirotor_multibody.with_propeller_failure(first, 2, "torn_off")
     times = [5 * H * N + moment for moment in (0.0003, 0.0017)]
     failures = (Failure(times[0], first, becomes == "locked"), Failure(times[1], second, False))
-    state = flown(p, start, 5, method=RK8)
+    state = fly(p, start, 5, method=RK8)
     state = advance_through(RK8, p, failures, (0, 0), 5, state, VOLTS, H, N)
-    state = flown(second, state, 4, 6, method=RK8)
+    state = fly(second, state, 4, 6, method=RK8)
     expected = by_dop853(p, start, times[0])
     if becomes == "locked":
-        expected = expected._replace(motion=struck(first, expected, VOLTS))
+        expected = expected._replace(motion=apply_impulse(first, expected, VOLTS))
     expected = by_dop853(first, expected, times[1] - times[0])
     expected = by_dop853(second, expected, 10 * H * N - times[1])
     error = coordinates_of(state.motion) - coordinates_of(expected.motion)
     assert np.abs(error).max() < 1e-9
 
 
-def test_failure_at_tick_is_that_of_tick():
-    """Bit for bit: the plant without failures that starts from the tick's state."""
+def test_failure_at_tick_equals_failure_between_runs():
+    """The result is bit-for-bit that of a plant without failures that starts at the tick."""
     p = multirotor_multibody.parameters(DRONE, EFFECTS, "torque")
-    state = flown(p, multirotor_multibody.initial_state(p, (0.0, 0.0, 0.0), ATTITUDE, SPEED, VELOCITY, OMEGA), 3)
+    state = fly(p, multirotor_multibody.initial_state(p, (0.0, 0.0, 0.0), ATTITUDE, SPEED, VELOCITY, OMEGA), 3)
     after = multirotor_multibody.with_propeller_failure(p, 1, "locked")
-    expected = flown(after, state._replace(motion=struck(after, state, VOLTS)), 1, 3)
+    expected = fly(after, state._replace(motion=apply_impulse(after, state, VOLTS)), 1, 3)
     for time in (0.0, 3 * H * N * (1.0 + 1e-12)):
         failures = (Failure(time, after, True),)
         assert advance_through(RK4, p, failures, (0, 0), 3, state, VOLTS, H, N) == expected

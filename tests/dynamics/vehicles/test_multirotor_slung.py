@@ -1,4 +1,4 @@
-"""The slung load against closed forms: pendulum, conservation, free fall on a slack cable, the pull at its end."""
+"""Slung load against closed forms: pendulum, conservation, free fall on a slack cable, force of a taut cable."""
 
 import math
 
@@ -31,7 +31,7 @@ def vehicle(sling):
     return slung.parameters(QUAD, sling, effects.from_scene({"gravity": {}, "rotor_thrust": {}}, QUAD))
 
 
-def flown(p, x, seconds, h=H):
+def simulate(p, x, seconds, h=H):
     state = slung.initial_state(p)._replace(motion=x)
     return slung.multirotor.advance(RK4, p, KEY, 0, state, (0.0,) * 4, h, round(seconds / h)).motion
 
@@ -42,7 +42,7 @@ def begin(p, load, load_velocity, omega=(0.0, 0.0, 0.0), velocity=(0.0, 0.0, 0.0
 
 
 def invariants(x):
-    """(energy [J], momentum [N s], angular momentum about the common centre of mass [N m s])."""
+    """Return (energy [J], momentum [N s], angular momentum about the common centre of mass [N m s])."""
     v, m, inertia = x.vehicle, QUAD.mass.total, np.array(QUAD.mass.inertia)
     position, load = np.array(v.position_world), np.array(x.load_position)
     velocity, load_velocity, omega = np.array(v.velocity_world), np.array(x.load_velocity), np.array(v.omega_body)
@@ -60,7 +60,7 @@ def invariants(x):
 
 
 def test_load_on_fixed_hook_is_pendulum():
-    """Period 4 sqrt(L / g) K(sin^2(a / 2)), L with the stretch under the load."""
+    """The period is 4 sqrt(L / g) K(sin^2(a / 2)), L including the stretch under the load."""
     sling = SLING._replace(stiffness=2e4)
 
     def slope(_, s):
@@ -85,7 +85,7 @@ def test_with_taut_cable_energy_and_both_momenta_are_kept():
     p = vehicle(SLING)
     x = begin(p, (0.05, 0.3, 97.9), (2.0, 0.5, 0.0), omega=(0.3, -0.2, 0.5))
     energy, momentum, angular = invariants(x)
-    after = invariants(flown(p, x, 3.0, 2.5e-4))
+    after = invariants(simulate(p, x, 3.0, 2.5e-4))
     assert after[0] == pytest.approx(energy, abs=1e-5)
     assert after[1] == pytest.approx(momentum - [0.0, 0.0, 3.0 * G * (QUAD.mass.total + SLING.load_mass)], abs=1e-9)
     assert after[2] == pytest.approx(angular, abs=1e-7)
@@ -93,24 +93,24 @@ def test_with_taut_cable_energy_and_both_momenta_are_kept():
 
 def test_on_slack_cable_both_fall_freely():
     p = vehicle(SLING)
-    x = flown(p, begin(p, (0.5, 0.0, 99.5), (0.3, 0.2, 1.0), velocity=(0.1, 0.0, 0.0)), 0.8)
+    x = simulate(p, begin(p, (0.5, 0.0, 99.5), (0.3, 0.2, 1.0), velocity=(0.1, 0.0, 0.0)), 0.8)
     assert x.load_position == pytest.approx((0.74, 0.16, 99.5 + 0.8 - 0.32 * G), abs=1e-9)
     assert x.vehicle.position_world == pytest.approx((0.08, 0.0, 100.0 - 0.32 * G), abs=1e-9)
     assert x.vehicle.omega_body == (0.0, 0.0, 0.0)
 
 
 def test_taut_cable_force_is_bounded_by_stiffness():
-    """In free fall and without damping: speed apart times sqrt(stiffness times reduced mass)."""
+    """The bound in free fall without damping is the separation speed times sqrt(stiffness times reduced mass)."""
     sling = SLING._replace(hook_body=(0.0, 0.0, 0.0))
     p, speed = vehicle(sling), 1.5
     x, most = begin(p, (0.0, 0.0, 98.2), (0.0, 0.0, -speed)), 0.0
     for _ in range(250):
-        x = flown(p, x, 1e-3, 2.5e-4)
+        x = simulate(p, x, 1e-3, 2.5e-4)
         most = max(most, math.hypot(*python_function(slung.cable)(sling, (1.0, 0, 0, 0, 1.0, 0, 0, 0, 1.0), x)[0]))
     reduced = 1.0 / (1.0 / sling.load_mass + 1.0 / QUAD.mass.total)
     assert most == pytest.approx(speed * math.sqrt(sling.stiffness * reduced), rel=2e-3)
     apart = x.load_velocity[2] - x.vehicle.velocity_world[2]
-    assert apart == pytest.approx(speed, rel=2e-3)  # thrown back as fast: nothing is lost
+    assert apart == pytest.approx(speed, rel=2e-3)  # rebounds at the same speed: no loss
 
 
 def test_damped_cable_pulls_and_never_pushes():
@@ -154,7 +154,7 @@ def test_autopilot_lifts_and_carries_load_at_height():
 
 @pytest.mark.parametrize("h", [4e-3, 1e-3])
 def test_load_rebounds_from_taut_cable_as_damped_spring(h):
-    """In free fall. Any step is as accurate as the tolerance."""
+    """In free fall every step is as accurate as the tolerance."""
     ratio, speed, slack = 0.1, 1.5, 0.02
     reduced = 1.0 / (1.0 / SLING.load_mass + 1.0 / QUAD.mass.total)
     w = math.sqrt(SLING.stiffness / reduced)
@@ -163,6 +163,6 @@ def test_load_rebounds_from_taut_cable_as_damped_spring(h):
     seconds = 0.1
     stretch, rate = rebound(slack, speed, w, ratio, seconds)
     apart = SLING.length + stretch
-    x = flown(p, begin(p, (0.0, 0.0, 100.0 - SLING.length + slack), (0.0, 0.0, -speed)), seconds, h)
+    x = simulate(p, begin(p, (0.0, 0.0, 100.0 - SLING.length + slack), (0.0, 0.0, -speed)), seconds, h)
     assert x.vehicle.position_world[2] - x.load_position[2] == pytest.approx(apart, abs=1e-7)
     assert x.vehicle.velocity_world[2] - x.load_velocity[2] == pytest.approx(rate, abs=1e-7)

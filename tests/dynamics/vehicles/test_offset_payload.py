@@ -1,4 +1,4 @@
-"""A payload with a place: parallel axes, momentum when it goes, and a flight that lets it go."""
+"""Offset payload: parallel axes, momentum at the release, and a flight with a release."""
 
 from pathlib import Path
 
@@ -29,7 +29,7 @@ RK4, KEY, STEP = get("rk4_renormalised").Method(), stream_key(1, "drone1", "effe
 
 
 def points_of(mass, inertia, centre):
-    """Six point masses (m, r) with this mass, centre and inertia matrix."""
+    """Return six point masses (m, r) with this mass, centre and inertia matrix."""
     second = 0.5 * np.trace(inertia) * np.eye(3) - inertia  # integral of r r^T dm
     values, axes = np.linalg.eigh(second)
     arms = [sign * np.sqrt(3.0 * v / mass) * a for v, a in zip(values, axes.T, strict=True) for sign in (1, -1)]
@@ -37,7 +37,7 @@ def points_of(mass, inertia, centre):
 
 
 def test_mass_centre_and_inertia_equal_point_masses():
-    """Against a sum over point masses that know no theorem; the box by hand: m (b^2 + c^2) / 12."""
+    """The reference is a sum over point masses; the box is m (b^2 + c^2) / 12 by hand."""
     box = 2.0 / 12.0 * np.diag([0.2**2 + 0.1**2, 0.3**2 + 0.1**2, 0.3**2 + 0.2**2])
     points = points_of(8.0, BARE.matrix, np.array(BARE.centre)) + points_of(2.0, box, np.array(BOX.position))
     masses, places = np.array([m for m, _ in points]), np.array([r for _, r in points])
@@ -64,7 +64,7 @@ def released(state):
 
 
 def momenta(mass, inertia, centre, motion):
-    """(linear, angular about the world's origin) momentum of a body, its centre of mass off the motion's position."""
+    """Return (linear, angular about the world's origin) momentum of a body with an offset centre of mass."""
     R = Rotation.from_quat(motion.attitude, scalar_first=True)
     omega = R.apply(motion.omega_body)
     arm = R.apply(centre)
@@ -74,7 +74,7 @@ def momenta(mass, inertia, centre, motion):
 
 
 def test_release_conserves_momentum_of_both():
-    """In free space: the vehicle's is constant after the release, and with the box's the one before."""
+    """In free space the vehicle's momentum is constant after the release; with the box's it equals the one before."""
     p, state = flying({"payload_release": {}})
     (effect,) = p.effects
     for tick in range(200):
@@ -106,8 +106,8 @@ def test_carried_payload_acts_as_part_of_body():
 
 
 @pytest.mark.long
-def test_empty_vehicle_is_vehicle_described_without_box():
-    """After the release it flies as the bare airframe does whose state is that of its own centre of mass."""
+def test_empty_vehicle_equals_airframe_without_box():
+    """After the release the vehicle flies as the bare airframe with the state of its centre of mass."""
     tables = {"gravity": {}, "rotor_thrust": {}, "h_force": {"coefficient": 1e-4}, "gyroscopic_torque": {}}
     p, state = flying({**tables, "payload_release": {}})
     state = released(state)
@@ -130,8 +130,8 @@ def test_empty_vehicle_is_vehicle_described_without_box():
 
 
 @pytest.mark.long
-def test_flight_lets_payload_go_that_hangs_ahead():
-    """The front rotors carry more with it; without it all carry the rest about the vehicle's own centre."""
+def test_flight_releases_payload_ahead_of_centre():
+    """The front rotors carry more with the payload; after the release thrusts balance about the vehicle's centre."""
     ahead, arm, g = 0.1, 0.35171491, 9.80665
     box = {"mass": 2.0, "position": [ahead, 0.0, -0.1], "size": [0.2, 0.13, 0.23]}
     flight = lapwing.fly(
@@ -180,7 +180,7 @@ def test_batch_release_is_bit_for_bit_identical():
         ({"vehicle.model": "multibody"}, "payload: the five bodies have no place for one"),
     ],
 )
-def test_refused_in_scene(overrides, message):
+def test_invalid_scene_payload_is_rejected(overrides, message):
     box = {"mass": 2.0, "position": [0.1, 0.0, -0.1], "size": [0.2, 0.13, 0.23]}
     with pytest.raises(ValueError, match=message):
         resolve(load("hover", {"airframe.mass.payload": 0.0, "airframe.payload": box, **overrides}))
@@ -200,7 +200,7 @@ def test_refused_in_scene(overrides, message):
         ({}, {}, {"size": [1.0, 1.0, 1.0]}, "effects.payload_release.size: stands beside the table airframe.payload"),
     ],
 )
-def test_refused(tmp_path, mass, payload, table, message):
+def test_invalid_payload_is_rejected(tmp_path, mass, payload, table, message):
     whole = FRAME.model_dump(exclude_none=True)
     whole["mass"] |= mass
     whole["payload"] |= payload

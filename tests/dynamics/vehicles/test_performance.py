@@ -1,4 +1,4 @@
-"""Steady flight against the plant itself, closed forms and the source's Table 8."""
+"""Steady flight against the plant, closed forms and Table 8 of the source."""
 
 import math
 from pathlib import Path
@@ -17,7 +17,7 @@ DRONE = load_airframe(Path(__file__).parents[3] / "lapwing/scenes/vehicles/deliv
 WEIGHT = DRONE.mass.total * 9.80665
 
 
-def test_hover():
+def test_hover_values_follow_closed_forms():
     hover = performance.trim(DRONE)
     assert hover.tilt == pytest.approx(0.0, abs=1e-12)
     assert hover.thrust == pytest.approx(WEIGHT / 4)
@@ -25,8 +25,8 @@ def test_hover():
     assert hover.voltage == pytest.approx(hover.rotor_speed / (150 * 2 / 3 * math.pi / 30) + 0.085 * hover.current)
 
 
-def test_trim_is_where_plant_does_not_accelerate():
-    """The plant under its own drag, H-force and inflow at the tilt and rotor speed of the card."""
+def test_plant_does_not_accelerate_at_trim():
+    """The plant has drag, H-force and inflow at the tilt and rotor speed of the card."""
     tables = {"gravity": {}, "rotor_thrust": {}, "axial_inflow": {}, "body_drag": {}, "h_force": {}}
     p = multirotor.parameters(DRONE, effects.from_scene(tables, DRONE))
     for speed in (3.0, 12.0, 20.0):
@@ -51,13 +51,13 @@ def test_power_has_minimum_and_grows_with_speed():
 
 
 def papers_density(height):
-    """By the source's law, with the temperature of the ground."""
+    """Return the density by the source's law, with the temperature of the ground."""
     return 1.293 * 273 / 288 * (1 - 0.0065 * height / 288) ** 5.2561
 
 
 def test_table_8_of_source():
     """Hover time 19.3 min, payload 9.9 kg, ceiling 5.3 km, tilt 58.9 degrees, speed 20.7 m/s, range 12.1 km: an online
-    estimator's figures; the last two hang on drag areas that are chosen."""
+    estimator's figures; the last two depend on chosen drag areas."""
     assert performance.hover_time(DRONE) / 60 == pytest.approx(19.3, rel=0.05)
     assert performance.maximum_payload(DRONE) == pytest.approx(9.9, rel=0.05)
     assert performance.maximum_thrust(DRONE, papers_density(5300.0)) == pytest.approx(WEIGHT, rel=0.06)
@@ -78,7 +78,7 @@ def test_highest_speed_uses_all_voltage():
     assert performance.maximum_range(DRONE)[1] <= top
 
 
-def test_without_parts():
+def test_missing_parts_are_rejected():
     with pytest.raises(ValueError, match=r"no \[propeller\]"):
         performance.trim(DRONE.model_copy(update={"propeller": None}))
     with pytest.raises(ValueError, match=r"no \[battery\]"):
@@ -102,8 +102,8 @@ def test_highest_thrust_keeps_current_and_power():
     assert max(less, least) < free
 
 
-def test_rotors_that_lean_past_one_another_carry_less():
-    """15 degrees along the way around the centre: the plant hovers at the card's trim, and lifts cos(15 deg)."""
+def test_tangentially_tilted_rotors_carry_less():
+    """Rotors tilt 15 degrees along the circumference: the plant hovers at the card's trim and lifts cos(15 deg)."""
     lean = math.radians(15.0)
     axes = tuple(
         (-math.sin(lean) * y / math.hypot(x, y), math.sin(lean) * x / math.hypot(x, y), math.cos(lean))
@@ -119,7 +119,7 @@ def test_rotors_that_lean_past_one_another_carry_less():
 
 
 def stacked(drone):
-    """Each rotor with a second one a decimetre above it, which turns the other way."""
+    """Return an airframe with a counter-rotating rotor 0.1 m above each rotor."""
     r = drone.rotors
     hubs = tuple((x, y, z) for x, y, _ in r.position for z in (0.0, 0.1))
     spins = tuple(way for spin in r.spin_direction for way in (spin, "cw" if spin == "ccw" else "ccw"))
@@ -127,8 +127,8 @@ def stacked(drone):
 
 
 @pytest.mark.parametrize("speed", [0.0, 6.0, 14.0])
-def test_trim_of_rotors_over_one_another_is_plants(speed):
-    """Under `coaxial_interference` the plant hovers at the card's trim and takes the card's current."""
+def test_trim_of_coaxial_rotors_equals_plant(speed):
+    """With `coaxial_interference` the plant hovers at the card's trim and draws the card's current."""
     frame = stacked(DRONE)
     tables = {"gravity": {}, "rotor_thrust": {}, "axial_inflow": {}, "body_drag": {}, "coaxial_interference": {}}
     p = multirotor.parameters(frame, effects.from_scene(tables, frame))

@@ -1,4 +1,4 @@
-"""The propeller's coefficients against the figures that the source's numbers give."""
+"""Propeller coefficients against the formulas of the source."""
 
 import math
 from pathlib import Path
@@ -12,7 +12,7 @@ from lapwing.dynamics.vehicles.propeller import drag_coefficients, thrust_coeffi
 PROPELLER = load_airframe(Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml").propeller
 
 
-def test_coefficients_by_source_formulas_written_out():
+def test_coefficients_follow_source_formulas():
     a, k, angle = 5.0, 6.11, 0.85 * math.atan(7.4 / (math.pi * 22.0))
     thrust = 0.25 * math.pi**3 * 0.75 * 0.5**2 * 2 * k * angle / (math.pi * a + k)
     drag = 0.015 + math.pi * a * k**2 / 0.83 * angle**2 / (math.pi * a + k) ** 2
@@ -22,7 +22,7 @@ def test_coefficients_by_source_formulas_written_out():
     assert torque_coefficient(PROPELLER) == pytest.approx(torque, rel=1e-14)
 
 
-def test_magnitudes():
+def test_coefficients_have_plausible_magnitudes():
     assert thrust_coefficient(PROPELLER) == pytest.approx(0.0738, abs=5e-5)
     assert torque_coefficient(PROPELLER) == pytest.approx(0.0050, abs=5e-5)
     highest = 44.4 * 150 * 2 / 3 / 60  # [1/s]

@@ -1,4 +1,4 @@
-"""OS4: the four experiments, first-order predictions, conserved quantities and motors."""
+"""OS4: four experiments, first-order predictions, conserved quantities and motors."""
 
 import math
 
@@ -24,7 +24,7 @@ def fly(rpm, p=OS4, method="lie_euler"):
     return unflatten(start(*rpm), tuple(map(float, states[-1])))
 
 
-def test_hover_speed_is_published_one():
+def test_hover_speed_equals_published_value():
     assert round(hover_speed(OS4) / RPM) == 2155
 
 
@@ -32,7 +32,7 @@ def test_experiment_1_hovers():
     end = fly((2155,) * 4)
     assert end.attitude == NO_ROTATION
     assert end.position_world[:2] == (0.0, 0.0)
-    # the rounded speed lacks 0.03 rpm of thrust or so
+    # the rounded speed is about 0.03 rpm too low
     lift = net_force(OS4, start(2155, 2155, 2155, 2155))[2]
     assert abs(lift) < 1e-3 * OS4.mass * OS4.gravity
     assert abs(end.position_world[2]) < 0.5 * abs(lift) / OS4.mass * 9.0 * 1.01
@@ -83,7 +83,7 @@ def test_net_vertical_force_to_first_order():
 
 
 def test_residual_rotor_speed_precesses_body():
-    # rotors 2 and 4 only, both one way: a gyroscope, J omega' = Omega_r J_r e3 x omega
+    # only rotors 2 and 4, both in one direction: a gyroscope, J omega' = Omega_r J_r e3 x omega
     x = start(0, 2155, 0, 2155)._replace(omega_body=(0.2, 0.0, 0.0))
     spin = OS4.rotor_inertia * 2 * 2155 * RPM
     actual = rate(OS4._replace(drag_constant=0.0), 0.0, x)
@@ -98,7 +98,7 @@ def test_free_fall_and_momentum_without_rotors():
 
 
 def steady_voltage(p, constant, resistance, speed):
-    """Voltage [V] that holds a rotor at a speed [rad/s] (theory.md, eq. (7.14) at rest)."""
+    """Return the voltage [V] that holds a rotor at a speed [rad/s] (theory.md, eq. (7.14) at rest)."""
     return resistance * p.drag_constant * speed * speed / constant + constant * speed
 
 
@@ -109,7 +109,7 @@ def test_motors_reach_voltage_speed_and_react_on_body():
     resting = start(0, 0, 0, 0)
     _, states = simulate(get("rkmk4"), p, resting, 1e-3, 20_000, every=20_000)
     assert states[-1, -4:] == pytest.approx([speed] * 4, rel=1e-6)
-    # spinning up rotors 2 and 4 only turns the body the other way, about z, by their momentum
+    # spinning up only rotors 2 and 4 turns the body about z in the opposite direction, by their momentum
     q = p._replace(motors=Os4Motors((0.0, u, 0.0, u), km, r), drag_constant=0.0)
     _, states = simulate(get("rkmk4"), q, resting, 1e-3, 500, every=500)
     rotor = q.rotor_inertia * (states[-1, -3] + states[-1, -1])

@@ -1,4 +1,4 @@
-"""A load that is let go: nothing jumps, the load falls freely, a quadrotor follows its thrust and turns as it did."""
+"""Released load: states are continuous, the load falls freely, a quadrotor follows its thrust and keeps its spin."""
 
 import numpy as np
 import pytest
@@ -15,7 +15,7 @@ INERTIA, MOMENT, SPIN = (0.08, 0.09, 0.13), (0.0, 0.0, 0.02), (0.0, 0.0, 0.3)
 
 
 def let_go():
-    """Both quadrotors turn about their axes, the second is tilted by a quarter turn about x."""
+    """Return a release with both quadrotors in rotation about their axes, the second tilted by 90 degrees about x."""
     drive = LiftCommand((THRUST, THRUST), (MOMENT, MOMENT))
     p = CooperativeLoadParameters((MASS, MASS), (INERTIA, INERTIA), (0.6, 0.8), 0.4, G, drive)
     links = (Swing((0.0, 0.0, -1.0), (2.0, 0.0, 0.0)), Swing((1.0, 0.0, 0.0), (0.0, 0.0, 3.0)))

@@ -1,4 +1,4 @@
-"""The unloading crate against closed forms: reaction, door, friction, rollers, bounces; the whole under half steps."""
+"""Unloading crate against closed forms: reaction, door, friction, rollers, bounces; convergence with half steps."""
 
 import math
 from itertools import pairwise
@@ -34,7 +34,7 @@ def run(p, x, seconds, start=0.0, h=H):
 
 
 def test_contact_of_equal_velocities_does_no_work():
-    """Pack and door turn together about the hinge: what the door takes from the pack, the pack gets."""
+    """Pack and door turn together about the hinge: their total energy is constant."""
     p = P._replace(floor_height=5.0, ramp_start=-1.0, door_damping=0.0, depth=9.0)
     angle, turning = 1.2, 0.7
     inward = np.array((-math.cos(angle + p.tilt), 0.0, math.sin(angle + p.tilt)))
@@ -85,7 +85,7 @@ def test_rollers_carry_pack_at_their_surface_speed():
     assert np.dot(x.velocity_world, FORWARD) == pytest.approx(2.5 * p.roller_radius, rel=1e-3)
 
 
-def test_ramp():
+def test_rollers_ramp_up_linearly():
     assert [roller_speed(P, t) for t in (0.5, 1.5, 9.0)] == pytest.approx([0.0, math.pi, 2 * math.pi])
 
 
@@ -98,7 +98,7 @@ def test_fall_bounces_lower_every_time():
         t += 0.005
         at.append(x.position_world[2])
         total.append(energy(p, t, x._replace(door=(0.0, 0.0))))
-    # between two bounces the energy is that of a free body: its stairs only go down
+    # between two bounces the energy is that of a free body: it only falls
     free = [e for e, z in zip(total, at, strict=True) if z > 0.13]
     assert all(b <= a + 1e-6 for a, b in pairwise(free))
     assert at[-1] == pytest.approx(HALF[2], abs=1e-3)
@@ -108,7 +108,7 @@ TIMES = (0.0123, 0.0430, 0.0779)  # [s] the rollers start, reach their speed, th
 
 
 def split_reference(x, end):
-    """SciPy's DOP853 over the pieces, each with parameters that do not change in it."""
+    """Return SciPy's DOP853 solution over pieces with constant parameters."""
     start, full, taken = TIMES
     pieces = (
         (0.0, start, P._replace(ramp_start=NEVER, pickup=NEVER)),
@@ -125,7 +125,7 @@ def split_reference(x, end):
 
 
 def ambient(x, p, t, y):
-    """Slope of the flat state; the attitude's is half the product of its quaternion with the body rates."""
+    """Return the rate of the flat state; quaternion rates are half the product with the body rates."""
     state = unflatten(x, tuple(map(float, y)))
     q, o = np.array(state.attitude), np.array(state.omega_body)
     turned = 0.5 * np.array([-q[1:] @ o, *(q[0] * o + np.cross(q[1:], o))])
@@ -134,7 +134,7 @@ def ambient(x, p, t, y):
 
 
 def test_ramp_and_pickup_between_ticks_are_exact():
-    """0.1 s of a pack that has settled on the rollers, in ticks of 4 ms and steps of 1 ms."""
+    """The pack has settled on the rollers; 0.1 s in ticks of 4 ms and steps of 1 ms."""
     x = settled = run(P._replace(ramp_start=NEVER, pickup=NEVER), initial_state(P), 1.0)
     p = P._replace(ramp_start=TIMES[0], ramp_duration=TIMES[1] - TIMES[0], pickup=TIMES[2])
     for tick in range(25):
@@ -143,7 +143,7 @@ def test_ramp_and_pickup_between_ticks_are_exact():
 
 
 def test_event_on_tick_takes_effect_there():
-    """12 ticks of 4 ms are 0.048 s only up to rounding; what is off by it is on the tick."""
+    """12 ticks of 4 ms are 0.048 s only up to rounding; an event off by rounding is on the tick."""
     x = run(P._replace(ramp_start=NEVER, pickup=NEVER), initial_state(P), 1.0)
     ends = [
         integrate_step_doubling(StepDoubling(RK4, 1e-9), P._replace(pickup=pickup), start, x, 1e-3, start + 0.004)
@@ -159,7 +159,7 @@ def test_event_on_tick_takes_effect_there():
     assert ends[0].velocity_world[2] > 0.05 > abs(ends[2].velocity_world[2])
 
 
-def test_whole_unloading_converges_and_door_shuts():
+def test_unloading_converges_and_door_shuts():
     coarse, fine = (
         integrate_step_doubling(StepDoubling(RK4, tolerance), P, 0.0, initial_state(P), step, 4.5)
         for tolerance, step in ((1e-5, 1e-3), (1e-8, 2.5e-4))
@@ -168,8 +168,8 @@ def test_whole_unloading_converges_and_door_shuts():
     x, _, z = coarse.position_world
     assert x > 0.2  # out of the crate
     assert z < 0.16  # and down
-    assert abs(coarse.position_world[1]) < 1e-9  # a planar motion, as the source has it
+    assert abs(coarse.position_world[1]) < 1e-9  # planar motion as in the source
     assert math.degrees(coarse.door[0]) > 95.0
     shut = run(P, coarse, 4.5, start=4.5)
     assert abs(math.degrees(shut.door[0])) < 0.5
-    assert shut.position_world[2] > 1.0  # somebody has taken the pack
+    assert shut.position_world[2] > 1.0  # the pack is removed

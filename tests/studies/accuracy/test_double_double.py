@@ -94,7 +94,7 @@ def test_order_counts_lower_part() -> None:
     assert not any((nan < 1.0, nan > 1.0, nan == 1.0, nan <= 1.0, nan >= 1.0))
 
 
-def test_values_without_finite_result_are_those_of_doubles() -> None:
+def test_values_without_finite_result_equal_those_of_doubles() -> None:
     infinite = number(math.inf)
     assert infinite + 1.0 == infinite == infinite * 2.0 == number(1.0) / 0.0
     assert number(1.0) / infinite == 0.0

@@ -13,7 +13,7 @@ from lapwing.studies.simulate import fly
 ROOT = Path(__file__).parents[3]
 
 
-def turned(angle):
+def yaw_quaternion(angle):
     return [0.0, 0.0, np.sin(angle / 2), np.cos(angle / 2)]
 
 
@@ -23,8 +23,8 @@ def flight(rate, position, orientation):
 
 
 def test_difference_at_common_ticks():
-    fine = flight(10, np.array([[0.1 * k, 0, 0] for k in range(7)]), turned(0.0))
-    coarse = flight(5, fine.truth.position[::2] + np.array([0, 0.3, 0]), turned(1e-9))
+    fine = flight(10, np.array([[0.1 * k, 0, 0] for k in range(7)]), yaw_quaternion(0.0))
+    coarse = flight(5, fine.truth.position[::2] + np.array([0, 0.3, 0]), yaw_quaternion(1e-9))
     for one, other in ((fine, coarse), (coarse, fine)):
         position, angle, largest = difference(one, other)
         assert (position, largest) == pytest.approx((0.3, 0.3))

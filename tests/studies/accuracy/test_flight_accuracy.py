@@ -75,7 +75,7 @@ def test_solver_error_excludes_sensor_resolution(tmp_path, accuracy, code, verdi
     results = json.loads((tmp_path / "a.json").read_text())
     loop = results["closed_loop"]
     assert max(quantity["error"] for quantity in loop["quantities"]) > 1e-4 > 1e-6 > results["error"]
-    assert loop["difference"]["error"] > 1e-7  # from 1e-12, by chance of what is rounded to another value
+    assert loop["difference"]["error"] > 1e-7  # from 1e-12, by chance of values rounded differently
     if accuracy == 1e-4:
         assert loop["signal"]["name"].startswith("imu.")
         assert loop["true_difference"] < 0.1 * loop["signal"]["difference"]

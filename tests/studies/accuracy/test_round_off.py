@@ -57,7 +57,7 @@ def test_end_of_linear_system_has_digits_of_extended_precision() -> None:
             assert abs(in_digits(value) - digits) < 1e-28
 
 
-def test_round_off_of_linear_system_is_that_of_digits() -> None:
+def test_round_off_of_linear_system_equals_error_in_digits() -> None:
     methods = fixed_step_methods(P, START, DURATION, 8)
     result = round_off.measure(Problem("oscillator", "s", DURATION, methods, lambda: np.zeros(2), "", {}))
     (method,) = (method for method in methods if method.name == round_off.METHOD)

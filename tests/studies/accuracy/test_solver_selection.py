@@ -88,7 +88,7 @@ def test_steps_finer_than_those_of_round_off_can_be_selected(measured_titles, mo
     assert solver_selection.overrides(scene, lambda text: None)[1] == "solver.step=0.002"
 
 
-def test_fleet_gets_one_solver_that_each_vehicle_meets(measured_titles, monkeypatch):
+def test_fleet_has_one_solver_that_meets_accuracy_of_each_vehicle(measured_titles, monkeypatch):
     """Each airframe is measured once."""
     points = [Point("rk4", 4, "s", h, 1e-12, 1e-5 / h, 1, {}) for h in (0.004, 0.002, 0.001)]
     errors = iter([(1e-5, 5e-6, 3e-7), (4e-4, 2e-4, 1e-6)])
@@ -145,7 +145,7 @@ def test_cheapest_that_meets_accuracy_is_set(solver, overrides, measured_titles,
     ],
 )
 def test_only_candidates_are_compiled(solver, names, measured_titles, monkeypatch, tmp_path):
-    """Each integrator takes seconds to compile, and the others are nowhere the cheapest."""
+    """Each integrator takes seconds to compile, and the others are never the cheapest."""
     problems = []
     points = [Point(name, 4, "s", 0.004, 1e-9, 1e-5, 1, {}) for name in names]
     monkeypatch.setattr(solver_selection, "measure", lambda problem: problems.append(problem) or points)

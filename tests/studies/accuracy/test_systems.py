@@ -45,7 +45,7 @@ def test_closed_form_solves_eulers_equations(t):
     assert free_rigid_body.closed_form(inertia, start, t) == pytest.approx(other, abs=1e-10)
 
 
-def test_matrices_are_those_of_library():
+def test_matrices_equal_those_of_library():
     q = np.array([[0.5, -0.5, 0.5, 0.5], [0.8, 0.0, 0.6, 0.0]])
     assert matrices(q)[0] == pytest.approx([0, -1, 0, 0, 0, 1, -1, 0, 0], abs=1e-15)
     assert matrices(q)[1] == pytest.approx([0.28, 0, 0.96, 0, 1, 0, -0.96, 0, 0.28], abs=1e-15)

@@ -24,7 +24,7 @@ from lapwing.studies.campaign.statistics import interval
 
 pytestmark = pytest.mark.long
 
-SCENE = "delivery_mission"  # its start, with a requirement that some runs miss
+SCENE = "delivery_mission"  # only its start, with a requirement that some runs miss
 SHORT = ("run.duration=3.5", 'success.require=["max_tilt < 0.03"]')
 VARY = {"vehicle.mass": normal(10.4, 0.3), "effects.random_wind_force.mean.0": uniform(0.0, 9.0)}
 RUNS = 40
@@ -216,7 +216,7 @@ def test_interval_is_computed_once_per_shard(monkeypatch):
     )
     rule, shards = StoppingRule(1e-9), {}
     for shard in range(300):
-        shards[shard ^ 1] = Count(10, 9, (("landed", 9), ("crashed", 1)))  # in pairs, the second one first
+        shards[shard ^ 1] = Count(10, 9, (("landed", 9), ("crashed", 1)))  # in pairs, in reverse order
         assert not rule.reached(shards)
     assert requested == list(range(10, 3010, 10))
 

@@ -1,4 +1,4 @@
-"""Plots of a campaign's report, of synthetic tables."""
+"""Plots of a campaign's report from synthetic tables."""
 
 from itertools import combinations
 from types import SimpleNamespace

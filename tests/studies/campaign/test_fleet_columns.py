@@ -44,7 +44,7 @@ def folder(tmp_path_factory):
 
 
 @pytest.mark.long
-def test_flights_of_fleet_are_those_of_its_vehicles():
+def test_each_flight_of_fleet_has_all_vehicles():
     setup = resolve(load("fleet", ["run.duration=1.0"]))
     flights, log = fly_each(setup, TOPICS), fly(setup)
     assert [flight.vehicle for flight in flights] == ["left", "right", "scout"]

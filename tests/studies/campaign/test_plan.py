@@ -24,7 +24,7 @@ def draw_values(new_plan, key):
         (loguniform(0.1, 100.0), stats.loguniform(0.1, 100.0)),
     ],
 )
-def test_quantiles_are_those_of_scipy(distribution, reference):
+def test_quantiles_equal_those_of_scipy(distribution, reference):
     for u in (0.001, 0.3, 0.5, 0.97):
         assert distribution.at(u) == pytest.approx(reference.ppf(u))
     assert parse(str(distribution)) == distribution
@@ -70,7 +70,7 @@ def test_invalid_distribution_is_rejected(text, message):
         parse(text)
 
 
-def test_draws_depend_on_seed_run_and_key_alone():
+def test_draws_depend_on_seed_run_and_key_only():
     one = plan("hover", runs=50, seed=3, vary={"a": normal(0, 1), "b": uniform(0, 1)})
     more = plan("hover", runs=80, seed=3, vary={"c": uniform(0, 1), "b": uniform(0, 1)})
     assert draw_values(one, "b") == draw_values(more, "b")[:50]

@@ -98,7 +98,7 @@ def synthetic_flights(monkeypatch):
 
 
 @pytest.mark.usefixtures("synthetic_flights")
-def test_selected_effects_are_studied_alone():
+def test_only_selected_effects_are_studied():
     rows = run_study(load(HOVER), 0.01, lambda *_: None, ["gravity", "body_drag", "collision"]).rows
     assert [(row.name, row.active) for row in rows] == [("gravity", True), ("body_drag", False), ("collision", False)]
     with pytest.raises(ValueError, match="unknown effect 'bodydrag'; did you mean body_drag"):

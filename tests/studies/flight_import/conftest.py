@@ -1,4 +1,4 @@
-"""Flight that the writers of all formats write."""
+"""Flight for the writers of all formats."""
 
 import numpy as np
 import pytest
@@ -11,7 +11,7 @@ from lapwing.studies.flight_import.recording import Recording
 
 @pytest.fixture(scope="module")
 def flight() -> Recording:
-    """A smooth turn in all axes whose rates, specific force and velocity belong to its attitude and position."""
+    """Return a smooth rotation about all axes with consistent rates, specific force and velocity."""
     t = INTERVAL * np.arange(SAMPLES)
     angles = np.column_stack([0.8 * t, 0.3 * np.sin(2.0 * t), 0.2 * np.cos(1.5 * t)])  # yaw, pitch, roll
     turn = Rotation.from_euler("ZYX", angles)

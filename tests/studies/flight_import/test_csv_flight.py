@@ -48,7 +48,7 @@ def test_columns_become_si_quantities(flight, path):
     assert result.valid.all()
 
 
-def test_gzip_gives_equal_recording(path, tmp_path):
+def test_gzip_has_equal_recording(path, tmp_path):
     packed = tmp_path / "flight.csv.gz"
     packed.write_bytes(gzip.compress(path.read_bytes()))
     assert np.array_equal(read(packed).position, read(path).position)

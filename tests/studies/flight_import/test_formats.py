@@ -47,7 +47,7 @@ def test_format_returns_flight(tmp_path, flight, name):
     assert any(note.startswith("gyroscope +0 ms against attitude, correlation 1.00") for note in result.notes)
 
 
-def test_ulog_setpoints_are_those_of_the_trajectory(tmp_path, flight):
+def test_ulog_setpoints_equal_those_of_the_trajectory(tmp_path, flight):
     write_ulog(tmp_path / "f.ulg", flight)
     result = open_flight(tmp_path / "f.ulg")
     n = len(result)

@@ -75,7 +75,7 @@ def test_unmeasured_quantities_of_a_log_are_nan(tmp_path, flight):
     assert again.omega == pytest.approx(flight.omega[: len(again)], abs=1e-6)
 
 
-def test_pulses_are_scaled_by_their_own_mapping(tmp_path, flight):
+def test_pulses_are_scaled_by_their_mapping(tmp_path, flight):
     source = write_blackbox(tmp_path / "f.csv", flight, 1000.0, 1000.0)
     result = open_flight(source, "betaflight_pwm")
     assert result.motor_voltage == pytest.approx(flight.motor_voltage, abs=1e-6)

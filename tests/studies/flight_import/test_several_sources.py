@@ -118,7 +118,7 @@ def test_dataflash_without_fix_has_no_positions_of_gps(dataflash, flight):
 
 
 @pytest.mark.parametrize("volts", [0.0, np.nan])
-def test_unmeasured_battery_gives_shares_of_voltage(dataflash, flight, volts):
+def test_unmeasured_battery_has_shares_of_voltage(dataflash, flight, volts):
     result = dataflash(lambda name, v: [(name, (*v[:2], volts, 0.0) if name == "BAT" else v)])
     assert result.motor_voltage == pytest.approx(flight.motor_voltage[: len(result)] / BATTERY, abs=2e-3)
     assert any("no battery voltage" in note for note in result.notes)

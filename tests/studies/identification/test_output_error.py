@@ -106,7 +106,7 @@ def test_command_writes_airframe_with_provenance(plant, tmp_path):
     assert done.returncode == 0, done.stderr
     assert not done.stderr
     assert "rate [rad/s]: " in done.stdout
-    assert "nan" not in done.stdout  # power, which no flight has measured
+    assert "nan" not in done.stdout  # power, which is not measured
     true = TRUE["airframe.motor.time_constant"]
     assert tomllib.loads(out.read_text())["motor"]["time_constant"] == pytest.approx(true, rel=0.1)
     assert "Identified by output error from 2 flights" in out.read_text()

@@ -20,7 +20,7 @@ INTERVAL, SECONDS = 0.01, 300.0
 
 @pytest.fixture(scope="module")
 def flight():
-    """Rest for 150 s, then circles, with random sensor errors."""
+    """Return a flight with 150 s at rest, then circles, and random sensor errors."""
     draw = np.random.default_rng(1)
     t = INTERVAL * np.arange(round(SECONDS / INTERVAL))
     moving = np.clip((t - 150.0) / 5.0, 0.0, 1.0)

@@ -24,7 +24,7 @@ def identify_scene(scene):
 
 
 def excitation_scene(kind, overrides=()):
-    """Return the scene `excitation` with steps or a square wave, as of a relay, on every axis."""
+    """Return the scene `excitation` with steps or a square wave like that of a relay on every axis."""
     text = (SCENES / "excitation.toml").read_text()
     head = text[: text.index("[[trajectory.phase]]")]
     phases = [UP]

@@ -89,7 +89,7 @@ def test_failing_gains_are_reported_and_require_force(tuning, tmp_path, monkeypa
     assert (result.exit_code, out.exists()) == (0, True)
 
 
-def test_weak_present_gains_give_warning():
+def test_weak_present_gains_raise_warning():
     output = []
     tune(load_scene(HOVER, ["autopilot.gains=paper"]), Bandwidths(), output.append)
     assert any(line.startswith("warning: present gains paper of the scene: roll: phase margin 2") for line in output)

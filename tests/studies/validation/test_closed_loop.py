@@ -29,7 +29,7 @@ def log(tmp_path_factory):
     return path
 
 
-def test_own_setpoints_give_own_flight(log):
+def test_flight_under_its_setpoints_is_reproduced(log):
     flights = fly_setpoints(SCENE, open_flight(log))
     assert flights.time[-1] > 3.0
     assert flights.difference < 0.01  # begins in the recording's climb, from rest

@@ -1,4 +1,4 @@
-"""Table of prediction errors: one number in a cell, complete in a narrow terminal."""
+"""Table of prediction errors: each cell has one number, complete in a narrow terminal."""
 
 import math
 

@@ -36,7 +36,7 @@ def errors(plant, flight, horizons, memory=NO_TRIM):
 def test_own_flight_is_predicted_to_rounding(plant, flights):
     flight = flights[0]
     (states,) = start_states(plant, [flight], NO_TRIM)
-    starts = np.arange(200, 400, 7)  # the rotors have forgotten what they began with
+    starts = np.arange(200, 400, 7)  # the initial speeds of the rotors no longer matter
     result = compare(flight, starts, (1, 10, 50), predict(plant, flight, starts, states, (1, 10, 50)))
     assert np.abs(result.position).max() < 1e-8
     assert np.abs(result.attitude).max() < 1e-6
@@ -131,7 +131,7 @@ def test_command_writes_errors_and_baselines(plant, tmp_path):
 
 @pytest.mark.long
 def test_repeated_flight_counts_once(plant, tmp_path):
-    """The copy is an imported log of the same file: errors and intervals are those of the first flights alone."""
+    """An imported log of the same file changes neither errors nor intervals."""
     paths = [write_csv(tmp_path / f"{f.name}.csv", f) for f in simulated(plant, 2.0, [1, 2])]
     copy, options = tmp_path / "copy.mcap", ("--mapping", "nanobench", "--horizons", "1,50")
     assert run("import", paths[0], "--mapping", "nanobench", "--out", copy).returncode == 0
