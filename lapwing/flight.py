@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from lapwing.cosim.complete_file import write_text
 from lapwing.cosim.config.provenance import attachments, failure, metadata
 from lapwing.cosim.diagram.topic_encoder import to_record_batches
 from lapwing.cosim.log import LogWriter
@@ -14,7 +15,6 @@ from lapwing.cosim.log.log_sequencer import Recording
 from lapwing.cosim.output_lock import write_errors
 from lapwing.messages.topics import EVENTS
 from lapwing.runs.log_events import event_messages
-from lapwing.studies.complete_file import write_text
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_topics import topic_of
 from lapwing.studies.flight_tracking import AXES

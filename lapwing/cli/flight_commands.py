@@ -9,7 +9,7 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import check_distinct, check_log, claim, claim_named
-from lapwing.studies.complete_file import write_text
+from lapwing.cosim.complete_file import write_text
 
 Flights = Annotated[
     list[Path], typer.Argument(metavar="FLIGHTS...", help="Lapwing logs (.mcap), or logs that `lapwing import` reads")

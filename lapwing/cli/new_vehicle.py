@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from lapwing.cli.new_command import new
+from lapwing.cosim.complete_file import write_text
 from lapwing.cosim.processes.interrupt import Interrupted
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.studies.complete_file import write_text
 
 if TYPE_CHECKING:
     from lapwing.vehicle_measurements import Figure

@@ -9,7 +9,7 @@ from lapwing.cli.app import app
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import claim
 from lapwing.cli.preflight import with_solver_selected
-from lapwing.studies.complete_file import write_text
+from lapwing.cosim.complete_file import write_text
 
 
 @app.command()

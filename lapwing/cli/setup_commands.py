@@ -9,7 +9,7 @@ import typer
 
 from lapwing.cli.app import app
 from lapwing.cli.output_paths import claim
-from lapwing.studies.complete_file import write_text
+from lapwing.cosim.complete_file import write_text
 
 
 class Kind(Enum):

@@ -4,12 +4,14 @@ import hashlib
 import html
 import re
 import zipfile
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 
+from lapwing.cosim.complete_file import complete_file
 from lapwing.cosim.config.provenance import package_version
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.config.serialise import to_json
+from lapwing.cosim.output_lock import write_errors
 from lapwing.fmi import variables as kinds
 from lapwing.fmi.exported_part import ExportedPart, export_part
 from lapwing.fmi.machine_code import PORTABLE
@@ -49,10 +51,15 @@ def export_fmu(setup: RunConfig, part_name: str, out: Path, version: int = 3, cp
             "documentation/index.html": _page(part, variables).encode(),
             "resources/run_config.json": to_json(setup).encode(),
         }
-    with zipfile.ZipFile(out, "w", zipfile.ZIP_DEFLATED) as archive:
+    write_archive(out, files)
+    return part
+
+
+def write_archive(path: Path, files: Mapping[str, bytes]) -> None:
+    """Write a ZIP archive of files by name, with a fixed date. Raise ValueError if it cannot be written."""
+    with write_errors(path), complete_file(path) as file, zipfile.ZipFile(file, "w") as archive:
         for name, content in files.items():
             archive.writestr(zipfile.ZipInfo(name, ZIP_DATE), content, zipfile.ZIP_DEFLATED)
-    return part
 
 
 def _token(part: ExportedPart, variables: Sequence[Variable]) -> str:

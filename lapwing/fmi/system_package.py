@@ -2,7 +2,6 @@
 
 import json
 import tempfile
-import zipfile
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,7 +11,7 @@ from lapwing.cosim.config.provenance import package_version
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.multi_vehicle import members
 from lapwing.fmi import variables as kinds
-from lapwing.fmi.fmu import ZIP_DATE, export_fmu
+from lapwing.fmi.fmu import export_fmu, write_archive
 from lapwing.fmi.machine_code import PORTABLE
 from lapwing.fmi.model_description import TYPES
 from lapwing.fmi.variables import column_names, variables_of
@@ -95,9 +94,7 @@ def export_system(setup: RunConfig, out: Path, version: int = 3, cpu: str = PORT
     components = _components(setup, parts, fmus)
     files[ssp.STRUCTURE] = _structure(setup, components, SSP_VERSIONS[version])
     files[ssp.SCENE] = json.dumps(_scene(setup, fmus), sort_keys=True).encode()
-    with zipfile.ZipFile(out, "w") as archive:
-        for name, content in files.items():
-            archive.writestr(zipfile.ZipInfo(name, ZIP_DATE), content, zipfile.ZIP_DEFLATED)
+    write_archive(out, files)
     return [component.name for component in components]
 
 

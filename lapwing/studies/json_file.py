@@ -5,7 +5,7 @@ import math
 from pathlib import Path
 from typing import Any
 
-from lapwing.studies.complete_file import write_text
+from lapwing.cosim.complete_file import write_text
 
 
 def write_json(path: Path, data: Any) -> None:

@@ -7,7 +7,7 @@ value. Lines that begin with # are comments. Source: QGroundControl developer gu
 from collections.abc import Iterable, Mapping
 from pathlib import Path
 
-from lapwing.cosim.output_lock import write_errors
+from lapwing.cosim.complete_file import write_text
 from lapwing.cosim.scene import KeyOrigin, SceneError
 from lapwing.dynamics.input_file import read_text
 from lapwing.services.common.autopilot_parameters import Parameter
@@ -54,5 +54,4 @@ def write(path: Path, table: Iterable[Parameter], values: Mapping[str, float]) -
     for p in sorted(table, key=lambda p: p.name):
         value, kind = (f"{values[p.name]:.0f}", _INT32) if p.whole else (repr(values[p.name]), _REAL32)
         rows.append(f"1\t1\t{p.name}\t{value}\t{kind}")
-    with write_errors(path):
-        path.write_text("\n".join([*_HEADER, *rows, ""]), encoding="utf-8")
+    write_text(path, "\n".join([*_HEADER, *rows, ""]))

@@ -1,5 +1,6 @@
 """Full disk: one line, and a complete log of the data written before."""
 
+import os
 import subprocess
 import sys
 import textwrap
@@ -77,3 +78,20 @@ def test_output_without_room_leaves_former_file(tmp_path, log, words, name):
     done = subprocess.run(limited, capture_output=True, text=True, check=False, cwd=tmp_path)
     assert (done.returncode, done.stderr) == (2, f"lapwing: {name}: cannot be written: file too large\n")
     assert {file.name: file.read_text() for file in tmp_path.iterdir()} == {name: "former file"}
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="mounts a small disk, as root")
+@pytest.mark.parametrize(("command", "name"), [("export-fmu", "a.fmu"), ("export-ssp", "a.ssp")])
+def test_fmu_without_room_leaves_nothing(tmp_path, command, name):
+    (tmp_path / "disk").mkdir()
+    part = ["--part", "plant"] if command == "export-fmu" else []
+    words = [sys.executable, "-m", "lapwing", command, "hover", *part, "--out", f"disk/{name}"]
+    script = 'mount -t tmpfs -o size=16k none disk && { "$@"; code=$?; ls -A disk; exit $code; }'
+    done = subprocess.run(
+        ["unshare", "--mount", "sh", "-c", script, "sh", *words],
+        capture_output=True, text=True, check=False, cwd=tmp_path,
+    )  # fmt: skip
+    if "unshare" in done.stderr or "mount" in done.stderr:
+        pytest.skip("needs the right to mount")
+    assert (done.returncode, done.stdout) == (2, "")
+    assert done.stderr == f"lapwing: disk/{name}: cannot be written: no space left on device\n"

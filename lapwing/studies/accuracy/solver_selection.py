@@ -7,6 +7,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
 
+from lapwing.cosim.complete_file import complete_file
 from lapwing.cosim.scene import KeyOrigin, Scene, SceneError
 from lapwing.dynamics import integrators
 from lapwing.dynamics.config_error import ConfigError
@@ -17,7 +18,6 @@ from lapwing.services.common.vehicle_schema import Effects, Vehicle
 from lapwing.services.plant.schema import Solver, accuracy_to_select_for
 from lapwing.studies.accuracy import plant, scenes
 from lapwing.studies.accuracy.work_precision import FINE_ENOUGH, Point, cheapest, measure
-from lapwing.studies.complete_file import complete_file
 
 CANDIDATES = ("rkmk2", "rk4_renormalised", "rkmk54", "rk8_renormalised")  # each the cheapest for some system and error
 IMPACT_SHARE = 3e-3  # of the accuracy, because an impact amplifies position errors to 300 times larger velocity errors

@@ -4,10 +4,10 @@ import shlex
 from collections.abc import Callable
 from pathlib import Path
 
+from lapwing.cosim.complete_file import complete_file
 from lapwing.cosim.output_lock import write_errors
 from lapwing.studies.campaign import campaign_plots, console_output
 from lapwing.studies.campaign.results import Results
-from lapwing.studies.complete_file import complete_file
 from lapwing.studies.report.matplotlib_figure import write_png
 from lapwing.studies.report.page import render
 from lapwing.studies.report.paper import Cover, Titled, write_pdf

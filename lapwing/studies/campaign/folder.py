@@ -18,6 +18,7 @@ from typing import Any
 
 import numpy as np
 
+from lapwing.cosim.complete_file import complete_file
 from lapwing.cosim.output_lock import write_errors
 from lapwing.cosim.run_errors import RunFailed
 from lapwing.services.common.run_schema import Published
@@ -26,7 +27,6 @@ from lapwing.studies.campaign import run_table
 from lapwing.studies.campaign.distributions import parse
 from lapwing.studies.campaign.plan import Plan
 from lapwing.studies.campaign.runs import Reference, Row, columns, scene_of, sources, vehicles
-from lapwing.studies.complete_file import complete_file
 
 MANIFEST = "campaign.json"
 LAST_SHARD = "last_shard"

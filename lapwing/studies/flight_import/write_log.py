@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from lapwing.cosim.complete_file import complete_file
 from lapwing.cosim.log import LogWriter
 from lapwing.cosim.output_lock import write_errors
 from lapwing.messages.topics import (
@@ -49,7 +50,6 @@ from lapwing.messages.types import (
     Vector3,
     VehicleState,
 )
-from lapwing.studies.complete_file import complete_file
 from lapwing.studies.flight_import.recording import Recording, Series
 
 VEHICLE = "drone1"

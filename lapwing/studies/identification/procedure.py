@@ -11,10 +11,10 @@ from typing import Any
 
 import numpy as np
 
+from lapwing.cosim.complete_file import write_text
 from lapwing.cosim.scene import Overrides, Scene
 from lapwing.services.common.vehicle_schema import VehicleAirframe
 from lapwing.services.scene_resolver import load_one
-from lapwing.studies.complete_file import write_text
 from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.identification.flight_parameters import apply_flight_parameters, is_flight_parameter
 from lapwing.studies.identification.output_error import HORIZONS, Fit, OutputError

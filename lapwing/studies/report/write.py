@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from lapwing.cosim.complete_file import complete_file
 from lapwing.cosim.output_lock import write_errors
-from lapwing.studies.complete_file import complete_file
 from lapwing.studies.flight_data import FlightData
 
 FORMATS = (".html", ".pdf", ".png")

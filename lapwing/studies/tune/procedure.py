@@ -4,6 +4,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
+from lapwing.cosim.complete_file import write_text
 from lapwing.cosim.scene import Scene
 from lapwing.services.autopilot.control import Parameters
 from lapwing.services.autopilot.controller_parameters import Airframe, build
@@ -15,7 +16,6 @@ from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.run_schema import follows_trajectory
 from lapwing.services.common.vehicle_schema import Vehicle
 from lapwing.studies.campaign.campaign_config import campaign_setup
-from lapwing.studies.complete_file import write_text
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.tune import corners, gain_refinement
 from lapwing.studies.tune.bandwidths import Bandwidths

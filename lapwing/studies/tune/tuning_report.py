@@ -7,7 +7,7 @@ from typing import Any
 import control
 import numpy as np
 
-from lapwing.studies.complete_file import write_text
+from lapwing.cosim.complete_file import write_text
 from lapwing.studies.report.page import render
 from lapwing.studies.report.plot import Level, Line, Panel, Plot
 from lapwing.studies.report.sections import Section

@@ -4,7 +4,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lapwing.studies.complete_file import write_text
+from lapwing.cosim.complete_file import write_text
 from lapwing.studies.report.page import render
 from lapwing.studies.report.plot import Line, Panel, Plot
 from lapwing.studies.report.sections import Section

@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lapwing.cosim.complete_file import complete_file
 from lapwing.cosim.output_lock import write_errors
-from lapwing.studies.complete_file import complete_file
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.view3d import require
 from lapwing.studies.view3d.headless import Browser

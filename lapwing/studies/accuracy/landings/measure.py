@@ -9,8 +9,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lapwing.cosim.complete_file import complete_file
 from lapwing.studies.accuracy.landings import cases
-from lapwing.studies.complete_file import complete_file
 from lapwing.studies.json_file import write_json
 from lapwing.studies.workers import workers
 
