@@ -58,6 +58,7 @@ class RunMonitor:
             patience: time [s] without a message after which a participant counts as stalled.
             services: publishers of log packets; each waits until its last one is confirmed.
         """
+        self._services = frozenset(services)
         self._unfinished = set(services)  # services whose last message has not arrived
         self.confirmed: set[str] = set()  # participants that have received the last message of every service
         self._logged = False  # the recorder's last message has arrived
@@ -212,7 +213,9 @@ class RunMonitor:
         if self.ended or silence < self._patience:
             return None
         silent = sorted(set(names) - set(self.waiting))
-        if silence < LONGEST and silence - starved(silent or names) < self._patience:
+        # If all services wait, one of them may have its input but no processor; the router is always silent.
+        suspects = silent if self._services.intersection(silent) or not self._services else names
+        if silence < LONGEST and silence - starved(suspects or names) < self._patience:
             return None
         where = f"at t = {self.time_ns * 1e-9:.3f} s"
         if silent:

@@ -132,6 +132,17 @@ def test_waiting_service_does_not_hide_stalled_service(watch):
     assert result == "plant: no answer for 2.5 s, at t = 0.000 s"
 
 
+def test_starved_service_that_waited_is_no_stall_of_router():
+    bus = SimpleNamespace(receive=lambda senders: None, watch_liveliness=lambda key, seen: None)
+    names = ["plant", "sensors", "router"]
+    watch = RunMonitor(bus, PublisherIds("test"), names, services=names[:2])
+    silent_for(watch, 2.6)
+    watch.waiting.update(plant="sensors", sensors="plant")
+    starved = dict.fromkeys(names, 0.0) | {"plant": 0.2}
+    assert watch.stall_message(names, lambda who: sum(starved[name] for name in who)) is None
+    assert watch.stall_message(names) == "router: no answer for 2.5 s, at t = 0.000 s"
+
+
 def test_starvation_excuse_is_bounded(watch):
     silent_for(watch, LONGEST + 0.1)
     assert watch.stall_message(["plant"], lambda who: LONGEST)

@@ -207,7 +207,7 @@ def test_foxglove_shows_running_flight(tmp_path, scene, vehicle, more):
             if len(actual) > 200 and events and not stopped:
                 run.send_signal(signal.SIGINT)  # at any time after the subscription
                 stopped = True
-        assert run.wait(timeout=300) == 130
+        assert run.wait(timeout=300) == (130 if stopped else 0)  # a starved client may miss the end of the flight
     with LogReader(path) as read:
         kept = [(t, payload) for _, _, t, payload in read.messages([f"/{vehicle}/events"])]
         flights = [(t, payload) for _, _, t, payload in read.messages([f"/{vehicle}/ground_truth"])]
