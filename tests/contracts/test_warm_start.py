@@ -76,7 +76,7 @@ def test_precompile_covers_all_kernels_of_run(tmp_path):
 @pytest.mark.skipif(sys.platform != "linux", reason="processes are not forked")
 @pytest.mark.parametrize("scene", ["hover", "delivery_mission"])
 def test_joined_process_looks_up_no_kernel(tmp_path, scene):
-    """With an empty cache, a process would compile a kernel that it looks up after joining."""
+    """An empty cache makes a process compile a kernel that it looks up after joining."""
     words = ["run", scene, "--set", "run.duration=0.5", "--set", "success.require=[]", "--log", tmp_path / "log.mcap"]
     subprocess.run([sys.executable, "-c", JOINS, tmp_path / "told", *words], check=True, capture_output=True)
     looked_up = [line.split(" ") for line in (tmp_path / "told").read_text().splitlines()]

@@ -69,7 +69,7 @@ def test_every_member_is_bit_for_bit_single_vehicle(batch):
 
 
 @pytest.mark.long
-def test_rotors_at_limit_of_axial_inflow_are_bit_for_bit_single_vehicle():
+def test_batch_at_limit_of_axial_inflow_equals_single_vehicle():
     """Two of three members reach the limit, whose steps have error control."""
     batch, ticks, volts = lapwing.BatchSimulator("hexacopter_tilted", 3), 25, (4.0, 5.0, 3.0, 6.0, 4.5, 5.5)
     start = {"position_world": (0.0, 0.0, 50.0), "rotor_speed": np.full((3, 6), 400.0)}

@@ -82,7 +82,7 @@ def test_output_without_room_leaves_former_file(tmp_path, log, words, name):
 
 @pytest.mark.skipif(os.geteuid() != 0, reason="mounts a small disk, as root")
 @pytest.mark.parametrize(("command", "name"), [("export-fmu", "a.fmu"), ("export-ssp", "a.ssp")])
-def test_fmu_without_room_leaves_nothing(tmp_path, command, name):
+def test_export_to_full_disk_leaves_no_file(tmp_path, command, name):
     (tmp_path / "disk").mkdir()
     part = ["--part", "plant"] if command == "export-fmu" else []
     words = [sys.executable, "-m", "lapwing", command, "hover", *part, "--out", f"disk/{name}"]

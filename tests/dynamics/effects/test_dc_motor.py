@@ -161,7 +161,7 @@ def test_current_is_continuous_when_voltage_changes(drone, situation):
 
 
 def test_braking_slows_down_as_fast_as_closed_form(drone, situation):
-    """With a shorted winding w decays at the rate K^2/(J R); at the current limit it falls in proportion to time."""
+    """A shorted winding slows w at the rate K^2/(J R); at the current limit w falls in proportion to time."""
     free = stepped(drone, situation(), [0.0], 300.0, 0.02, braking_current=1e4)
     t = np.arange(len(free)) * 2e-5
     assert free == pytest.approx(300.0 * np.exp(-t * K**2 / (8.6e-4 * R)), rel=1e-5)

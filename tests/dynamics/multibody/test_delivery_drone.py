@@ -93,7 +93,7 @@ def test_free_flight_keeps_angular_momentum_under_motors():
 
 
 def test_hover():
-    """With thrust equal to weight and counter-rotating pairs nothing moves; hinges carry thrust less weight."""
+    """Thrust equal to weight and counter-rotating pairs move nothing; hinges carry thrust less weight."""
     drone = delivery_drone(**PAPER)
     mass = drone.mass + sum(drone.propeller_mass)
     x = DroneState((0.0,) * 3, quaternion.NO_ROTATION, (0.0,) * 3, (0.0,) * 3, ZERO4, (300.0, -300.0, 300.0, -300.0))

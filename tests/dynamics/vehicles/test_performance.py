@@ -128,7 +128,7 @@ def stacked(drone):
 
 @pytest.mark.parametrize("speed", [0.0, 6.0, 14.0])
 def test_trim_of_coaxial_rotors_equals_plant(speed):
-    """With `coaxial_interference` the plant hovers at the card's trim and draws the card's current."""
+    """The plant with `coaxial_interference` hovers at the card's trim and draws the card's current."""
     frame = stacked(DRONE)
     tables = {"gravity": {}, "rotor_thrust": {}, "axial_inflow": {}, "body_drag": {}, "coaxial_interference": {}}
     p = multirotor.parameters(frame, effects.from_scene(tables, frame))

@@ -215,16 +215,15 @@ def test_stuck_battery_does_not_warn():
     assert at(stuck, "battery", 12.0, lambda m: m.percentage) < 0.15  # as published by the pack
 
 
+def fly_hexacopter(duration, script):
+    """Return a flight of a hexacopter under scripted commands; rotor damage begins after its end."""
+    overrides = ["autopilot.estimator=ground_truth", "effects.rotor_damage.time=99.0", f"run.duration={duration}"]
+    return memory_log.fly(load("hexacopter", [ENABLED, *OPERATED, *overrides]), scripted(script))
+
+
 def test_each_of_six_motors_can_fail():
     script = {0.04: [command("takeoff", 3.0), command("arm")], 6: [inject("motor", OFF, 6)]}
-    overrides = [
-        ENABLED,
-        *OPERATED,
-        "run.duration=7",
-        "autopilot.estimator=ground_truth",
-        "effects.rotor_damage.time=99.0",
-    ]
-    flight = memory_log.fly(load("hexacopter", overrides), scripted(script))
+    flight = fly_hexacopter(7, script)
     assert at(flight, "status", 6.9, lambda m: m.failed_motor) == 6
     assert set(voltages(flight, 6.1)[:, 5]) == {0.0}
     assert height(flight, 6.9) > 2.0
@@ -236,14 +235,7 @@ def test_repaired_motor_returns_to_the_allocation():
     for k in range(1, 7):
         script[5.0 + k] = [inject("motor", OFF, k, id=10 + k)]
         script[5.5 + k] = [inject("motor", SOUND, k, id=20 + k)]
-    overrides = [
-        ENABLED,
-        *OPERATED,
-        "run.duration=13",
-        "autopilot.estimator=ground_truth",
-        "effects.rotor_damage.time=99.0",
-    ]
-    flight = memory_log.fly(load("hexacopter", overrides), scripted(script))
+    flight = fly_hexacopter(13, script)
     for k in range(1, 7):
         assert at(flight, "status", 5.4 + k, lambda m: m.failed_motor) == k
         assert at(flight, "status", 5.9 + k, lambda m: m.failed_motor) == 0

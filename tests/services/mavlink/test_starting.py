@@ -40,7 +40,7 @@ def test_commands_are_temporarily_rejected():
     assert station.command(400, 1.0) == mavlink.MAV_RESULT_ACCEPTED
 
 
-def test_parameter_set_during_start_is_acknowledged_and_reaches_autopilot():
+def test_autopilot_gets_parameter_that_was_set_before_its_start():
     """PX4's parameters can be set from its first heartbeat; its client tests do so."""
     bench = Bench(starting=True)
     station = bench.station()
