@@ -4,6 +4,12 @@ import difflib
 from collections.abc import Iterable
 
 
+def did_you_mean(name: str, choices: Iterable[str]) -> str:
+    """Return "; did you mean X?" for the choice nearest to an unknown name, "" if none is similar."""
+    near = difflib.get_close_matches(name, list(choices), n=1)
+    return f"; did you mean {near[0]}?" if near else ""
+
+
 class ConfigError(ValueError):
     """Invalid value of a key; `str` is one line."""
 
@@ -22,9 +28,11 @@ class ConfigError(ValueError):
     def unknown(cls, key: str, what: str, name: object, choices: Iterable[str]) -> "ConfigError":
         """Return the error of an unknown name; it lists the choices, the nearest first."""
         listed = sorted(choices)
-        near = difflib.get_close_matches(str(name), listed, n=1)
-        hint = f"; did you mean {near[0]}?" if near else ""
-        return cls(key, f"unknown {what} {name!r}{hint}", f"one of {', '.join(listed)}" if listed else "none")
+        return cls(
+            key,
+            f"unknown {what} {name!r}{did_you_mean(str(name), listed)}",
+            f"one of {', '.join(listed)}" if listed else "none",
+        )
 
     def with_prefix(self, prefix: str) -> "ConfigError":
         """Return the error with a key relative to the enclosing table."""

@@ -1,12 +1,13 @@
 """Discovery of the modules of a folder: to add an effect, an integrator, a sensor or a plot, add one file."""
 
-import difflib
 import importlib
 import pkgutil
 from collections.abc import Mapping
 from functools import cache
 from types import ModuleType
 from typing import TypeVar
+
+from lapwing.dynamics.config_error import did_you_mean
 
 T = TypeVar("T")
 
@@ -44,9 +45,7 @@ def choose(choices: Mapping[str, T], name: str, what: str) -> T:
     """
     if name in choices:
         return choices[name]
-    near = difflib.get_close_matches(name, choices, n=1)
-    hint = f"; did you mean {near[0]}?" if near else ""
-    raise ValueError(f"unknown {what} {name!r}{hint} ({what}s: {', '.join(choices)})")
+    raise ValueError(f"unknown {what} {name!r}{did_you_mean(name, choices)} ({what}s: {', '.join(choices)})")
 
 
 def _package_name(package: ModuleType | str) -> str:

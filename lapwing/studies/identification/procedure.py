@@ -3,7 +3,7 @@
 import hashlib
 import json
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import compress
 from pathlib import Path
@@ -13,10 +13,11 @@ import numpy as np
 
 from lapwing.cosim.complete_file import write_text
 from lapwing.cosim.scene import Overrides, Scene
+from lapwing.dynamics.config_error import did_you_mean
 from lapwing.services.common.vehicle_schema import VehicleAirframe
 from lapwing.services.scene_resolver import load_one
 from lapwing.studies.flight_import.recording import Recording
-from lapwing.studies.identification.flight_parameters import apply_flight_parameters, is_flight_parameter
+from lapwing.studies.identification.flight_parameters import KEYS, apply_flight_parameters, is_flight_parameter
 from lapwing.studies.identification.output_error import HORIZONS, Fit, OutputError
 from lapwing.studies.identification.toml_tables import dump
 from lapwing.studies.validation.plant_rows import PlantRows
@@ -162,10 +163,23 @@ def start_value(scene: Scene, key: str) -> float:
     except (KeyError, IndexError, AttributeError, TypeError, ValueError):
         value = None
     if isinstance(value, bool) or not isinstance(value, int | float):
-        raise ValueError(
-            f"--free {key}: no number of this name in the scene; name a key that the scene or airframe sets"
+        hint = (
+            did_you_mean(key, [*_number_keys(scene.resolved), *KEYS]) or "; use a key that the scene or airframe sets"
         )
+        raise ValueError(f"--free {key}: no number of this name in the scene{hint}")
     return float(value)
+
+
+def _number_keys(tables: Mapping[str, Any]) -> Iterator[str]:
+    """Yield the dotted keys of the numbers of airframe and effects."""
+    nodes = [(name, tables[name]) for name in ("airframe", "effects") if name in tables]
+    while nodes:
+        key, value = nodes.pop()
+        if isinstance(value, dict | list):
+            items = value.items() if isinstance(value, dict) else enumerate(value)
+            nodes += [(f"{key}.{name}", item) for name, item in items]
+        elif isinstance(value, int | float) and not isinstance(value, bool):
+            yield key
 
 
 def _held_out(count: int, seed: int) -> set[int]:

@@ -14,7 +14,7 @@ UNITS = dict(zip(FIELDS, ("m", "m/s", "rad", "rad/s", "m/s^2", "W"), strict=True
 
 
 def show(console: Console, validation: Validation) -> None:
-    """Print the errors, those of the baselines, and the skipped flights."""
+    """Print the errors, those of the baselines, warnings, and the skipped flights."""
     extent = f"{validation.windows} windows, {len(validation.flights)} flights"
     heads, rows = error_table(validation)
     console.print(f"{validation.scene}: mean absolute prediction error, {extent}", soft_wrap=True)
@@ -33,6 +33,8 @@ def show(console: Console, validation: Validation) -> None:
         f"start: measured state; rotor speeds from past commands; trim from the past {memory.force:g} s (force) and "
         f"{memory.torque:g} s (torque); 95 % intervals over flights",
     )
+    for line in validation.warnings:
+        console.print(f"warning: {line}", soft_wrap=True)
     for line in validation.skipped:
         console.print(f"left out: {line}", soft_wrap=True)
     faulty = [(f.recording.name, f.recording.faults) for f in validation.flights if f.recording.faults]

@@ -15,9 +15,10 @@ from lapwing.studies.validation.linear_baseline import linear_fit
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.prediction_metrics import FIELDS, Metric, constant_velocity, magnitudes, pool_flights
 from lapwing.studies.validation.start_states import USUAL_TRIM, StartStates, TrimMemory, start_states
-from lapwing.studies.validation.windows import Errors, compare, predict, window_starts
+from lapwing.studies.validation.windows import Errors, compare, predict, thrust_ratio, window_starts
 
 STRIDE = 5  # samples between the starts of two windows
+SAME_VEHICLE = 0.25  # largest difference of the thrust ratio from 1; 0.12 in 44 flights of one Crazyflie
 
 
 @dataclass(frozen=True)
@@ -28,6 +29,7 @@ class FlightErrors:
     starts: np.ndarray  # first samples of the windows
     plant: Errors
     states: StartStates
+    thrust_ratio: float  # predicted over measured specific force along body z; NaN if the vehicle falls
 
 
 @dataclass(frozen=True)
@@ -48,6 +50,16 @@ class Validation:
     def windows(self) -> int:
         """Number of windows."""
         return sum(len(f.starts) for f in self.flights)
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """A line for each flight that looks like one of another vehicle."""
+        return tuple(
+            f"{f.recording.name}: the motor commands produce {f.thrust_ratio:.2f} times the measured specific force; "
+            f"check that {self.scene} is the vehicle of this log"
+            for f in self.flights
+            if abs(f.thrust_ratio - 1.0) > SAME_VEHICLE
+        )
 
 
 def validate(
@@ -93,7 +105,7 @@ def validate(
     for recording in used:
         if recording.rotors != plant.rotors:
             raise ValueError(
-                f"{recording.name}: {recording.rotors} motors, the scene has {plant.rotors}; map the others"
+                f"{recording.name}: {recording.rotors} motors, the scene has {plant.rotors}; use the vehicle's scene"
             )
     report("start states", 0, len(used))
     states = start_states(plant, used, memory)
@@ -101,7 +113,7 @@ def validate(
     for k, (recording, s, state) in enumerate(zip(used, starts, states, strict=True)):
         report(recording.name, k, len(used))
         errors = compare(recording, s, horizons, predict(plant, recording, s, state, horizons))
-        flights.append(FlightErrors(recording, s, errors, state))
+        flights.append(FlightErrors(recording, s, errors, state, thrust_ratio(recording, s, state)))
     report("baselines", len(used), len(used))
     constant = [constant_velocity(r, s, horizons) for r, s in zip(used, starts, strict=True)]
     baselines = {"constant_velocity": constant, "linear_fit": linear_fit(used, starts, horizons)}
@@ -161,6 +173,7 @@ def write_json(path: Path, validation: Validation) -> None:
         "horizons": rows,
         "flights": flights,
         "skipped": validation.skipped,
+        "warnings": validation.warnings,
     }
     if validation.closed_loop:
         content["closed_loop"] = [
@@ -177,7 +190,13 @@ def write_json(path: Path, validation: Validation) -> None:
 
 def _flight(validation: Validation, flight: FlightErrors) -> dict:
     means = _values(pool_flights([magnitudes(flight.plant)[:, -1:]])[0])
-    return {"windows": len(flight.starts), **means, "faults": flight.recording.faults, "notes": flight.recording.notes}
+    return {
+        "windows": len(flight.starts),
+        **means,
+        "thrust_ratio": flight.thrust_ratio,
+        "faults": flight.recording.faults,
+        "notes": flight.recording.notes,
+    }
 
 
 def _values(metrics: list[Metric]) -> dict[str, float]:

@@ -33,6 +33,7 @@ def write(path: Path, validation: Validation) -> None:
         f"uses the measured motor commands. Trim from the past {validation.memory.force:g} s (force) and "
         f"{validation.memory.torque:g} s (torque)."
     )
+    lead += "".join(f" Warning: {line}." for line in validation.warnings)
     page = render(
         "validation.html", title=f"{validation.scene}: prediction of recorded flights", lead=lead,
         outcome=_outcome(validation), sections=sections,
@@ -84,13 +85,14 @@ def _loops(validation: Validation) -> list[Rows]:
 
 
 def _flights(validation: Validation) -> Rows:
-    table = Rows("Flights", "flight", "windows", "marked samples", "notes")
+    table = Rows("Flights", "flight", "windows", "predicted / measured specific force", "marked samples", "notes")
     for flight in validation.flights:
         faults = ", ".join(f"{cause}: {n}" for cause, n in flight.recording.faults.items())
-        table.add(flight.recording.name, str(len(flight.starts)), faults or "none", "; ".join(flight.recording.notes))
+        ratio, notes = f"{flight.thrust_ratio:.2f}", "; ".join(flight.recording.notes)
+        table.add(flight.recording.name, str(len(flight.starts)), ratio, faults or "none", notes)
     for line in validation.skipped:
         name, _, why = line.partition(": ")
-        table.add(name, "0", "", why)
+        table.add(name, "0", "", "", why)
     return table
 
 

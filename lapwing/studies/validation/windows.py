@@ -6,6 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lapwing.dynamics.environment import STANDARD_GRAVITY
 from lapwing.studies.flight_import.recording import LOWEST, Recording
 from lapwing.studies.rotation_arrays import conjugate, product, rotate, rotation_vector
 from lapwing.studies.validation.plant_rows import MOTION, PlantRows
@@ -14,6 +15,7 @@ from lapwing.studies.validation.start_states import StartStates
 PAST = 20  # number of samples before a window that must be valid, for rotor speeds and trim
 POWER, WIDTH = MOTION + 3, MOTION + 4  # column of the power, and number of columns, of a prediction
 BATCH = 16_384  # windows per batch
+UPWARD = np.array([0.0, 0.0, STANDARD_GRAVITY])  # [m/s^2] world, specific force at rest
 
 
 class Errors(NamedTuple):
@@ -34,6 +36,20 @@ def window_starts(flight: Recording, longest: int, stride: int, lowest: float = 
     count = np.concatenate([[0], np.cumsum(~usable)])
     starts = np.arange(PAST, len(flight) - longest, stride)
     return starts[count[starts + longest + 1] == count[starts - PAST]]
+
+
+def thrust_ratio(flight: Recording, starts: np.ndarray, states: StartStates) -> float:
+    """Return the ratio of predicted to measured specific force along body z, of their medians over the windows.
+
+    Both follow from the change of velocity over the first sample of each window, so the ratio needs no accelerometer.
+    It is 1 for the scene's own vehicle, and thrust over mass of the scene over that of any other vehicle in hover. NaN
+    if the measured force is not positive.
+    """
+    acceleration = (flight.velocity[starts + 1] - flight.velocity[starts]) / flight.interval
+    measured = _in_body(flight.attitude[starts], acceleration + UPWARD)[:, 2]
+    predicted = measured - states.residual[0, starts, 2]
+    force = float(np.median(measured))
+    return float(np.median(predicted)) / force if force > 0.0 else np.nan
 
 
 def predict(
@@ -114,8 +130,7 @@ def compare(flight: Recording, starts: np.ndarray, horizons: tuple[int, ...], pr
     """Return predicted minus measured values."""
     at = starts[:, None] + np.array(horizons)
     attitude = product(conjugate(flight.attitude[at]), predicted[..., 3:7])
-    upward = np.array([0.0, 0.0, 9.80665])
-    middle = _in_body(predicted[..., 3:7], predicted[..., 13:16] + upward)
+    middle = _in_body(predicted[..., 3:7], predicted[..., 13:16] + UPWARD)
     force = 0.5 * (flight.specific_force[at] + flight.specific_force[at - 1])
     return Errors(
         predicted[..., :3] - flight.position[at],

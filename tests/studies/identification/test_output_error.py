@@ -119,7 +119,15 @@ def test_command_writes_airframe_with_provenance(plant, tmp_path):
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("free", "message"),
-    [("airframe.motor.colour", "no number of this name"), ("a,a", "names a key twice"), ("", "--free: missing")],
+    [
+        ("airframe.motor.colour", "no number of this name"),
+        ("airframe.mass.totl", "did you mean airframe.mass.total?"),
+        ("effects.h_force.coeficient", "did you mean effects.h_force.coefficient?"),
+        ("flight.comand_delay", "did you mean flight.command_delay?"),
+        ("zzz", "use a key that the scene"),
+        ("a,a", "names a key twice"),
+        ("", "--free: missing"),
+    ],
 )
 def test_command_rejects_unknown_parameters(plant, tmp_path, free, message):
     path = write_csv(tmp_path / "flight.csv", simulated(plant, 2.0, [1])[0])

@@ -12,7 +12,7 @@ from lapwing.studies.validation.linear_baseline import linear_fit
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.prediction_metrics import constant_velocity, magnitudes, pool_flights
 from lapwing.studies.validation.start_states import NO_TRIM, TrimMemory, start_states
-from lapwing.studies.validation.windows import compare, predict, window_starts
+from lapwing.studies.validation.windows import compare, predict, thrust_ratio, window_starts
 
 SCENE = "crazyflie_21"
 
@@ -78,6 +78,14 @@ def test_constant_velocity_matches_closed_form(flights):
     assert result.position[:, 0] == pytest.approx(expected, abs=1e-12)
 
 
+@pytest.mark.parametrize("factor", [0.5, 1.0, 2.0])
+def test_thrust_ratio_is_inverse_mass_ratio(plant, flights, factor):
+    """Thrust depends on motor commands and motion only, so twice the mass has half the specific force."""
+    scene = PlantRows(SCENE, INTERVAL, [f"airframe.mass.total={factor * plant.mass[0]}"])
+    (states,) = start_states(scene, flights[:1], NO_TRIM)
+    assert thrust_ratio(flights[0], window_starts(flights[0], 1, 5), states) == pytest.approx(1.0 / factor, rel=0.01)
+
+
 def test_linear_fit_beats_constant_velocity(flights):
     starts = [window_starts(f, 20, 2) for f in flights]
     fitted = np.mean([np.abs(e.velocity).mean() for e in linear_fit(flights, starts, (20,))])
@@ -127,6 +135,19 @@ def test_command_writes_errors_and_baselines(plant, tmp_path):
     assert 0.0 < last["position"] < last["baselines"]["constant_velocity"]["position"]
     assert set(last["baselines"]) == {"constant_velocity", "linear_fit"}
     assert "Errors over the envelope" in page_text(page)
+
+
+@pytest.mark.long
+def test_flight_of_another_vehicle_is_reported(plant, tmp_path):
+    path = write_csv(tmp_path / "mine.csv", simulated(plant, 2.0, [1])[0])
+    files = ("--json", tmp_path / "errors.json", "--report", tmp_path / "page.html")
+    warning = "mine: the motor commands produce 0.50 times the measured specific force; check that"
+    for heavier, expected in ((), 0), (("--set", f"airframe.mass.total={2.0 * plant.mass[0]}"), 1):
+        done = run("validate", SCENE, path, "--mapping", "nanobench", "--horizons", "1,50", *files, *heavier)
+        assert done.returncode == 0, done.stderr
+        assert done.stdout.count(f"warning: {warning}") == expected
+        assert len(json.loads((tmp_path / "errors.json").read_text())["warnings"]) == expected
+        assert page_text(tmp_path / "page.html").count(warning) == expected
 
 
 @pytest.mark.long
