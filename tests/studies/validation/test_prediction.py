@@ -1,4 +1,5 @@
 import json
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -141,13 +142,13 @@ def test_command_writes_errors_and_baselines(plant, tmp_path):
 def test_flight_of_another_vehicle_is_reported(plant, tmp_path):
     path = write_csv(tmp_path / "mine.csv", simulated(plant, 2.0, [1])[0])
     files = ("--json", tmp_path / "errors.json", "--report", tmp_path / "page.html")
-    warning = "mine: the motor commands produce 0.50 times the measured specific force; check that"
+    warning = r"mine: the motor commands produce 0\.(49|50|51) times the measured specific force; check that"
     for heavier, expected in ((), 0), (("--set", f"airframe.mass.total={2.0 * plant.mass[0]}"), 1):
         done = run("validate", SCENE, path, "--mapping", "nanobench", "--horizons", "1,50", *files, *heavier)
         assert done.returncode == 0, done.stderr
-        assert done.stdout.count(f"warning: {warning}") == expected
+        assert len(re.findall(f"warning: {warning}", done.stdout)) == expected
         assert len(json.loads((tmp_path / "errors.json").read_text())["warnings"]) == expected
-        assert page_text(tmp_path / "page.html").count(warning) == expected
+        assert len(re.findall(warning, page_text(tmp_path / "page.html"))) == expected
 
 
 @pytest.mark.long
