@@ -24,7 +24,7 @@ def vehicle(
     measured: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", metavar="FIGURE=VALUE", help="measured value, e.g. mass=2.0; not asked for again (repeatable)"
+            "--set", metavar="FIGURE=VALUE", help="measured value, e.g. mass=2.0; skips its question (repeatable)"
         ),
     ] = None,
 ) -> None:

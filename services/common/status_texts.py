@@ -19,12 +19,12 @@ NOT_STARTED = "the estimator has not started"
 NO_READINGS = "no good readings of the {}"  # sensor
 POSITION_UNCERTAIN = "the position is uncertain"
 ATTITUDE_UNCERTAIN = "the attitude is uncertain"
-NOT_LEVEL = "the vehicle does not stand level"
-OUTSIDE_FENCE = "the vehicle stands outside of the fence"
+NOT_LEVEL = "the vehicle is not level"
+OUTSIDE_FENCE = "the vehicle is outside the fence"
 """Arming blockers; BATTERY_LOW followed by the charge is another."""
 
 ARMED, DISARMED, LANDED = "armed", "disarmed: {}", "landed"
-AS_COMMANDED, AFTER_LANDING, NO_TAKEOFF = "as commanded", "landed", "nobody took off"
+AS_COMMANDED, AFTER_LANDING, NO_TAKEOFF = "as commanded", "landed", "no takeoff after arming"
 """Reasons for disarming."""
 TAKEN_OVER = "{}: {}"  # reason and mode of a failsafe
 

@@ -106,7 +106,9 @@ def from_scene(
         module = table.pop("module", None)
         kind = getattr(get(name, module), "KIND", name)
         if kind in kinds:
-            raise ConfigError(f"effects.{name}", f"excludes effects.{kinds[kind]}, both are a {kind}: keep one of them")
+            raise ConfigError(
+                f"effects.{name}", f"cannot be combined with effects.{kinds[kind]}, also a {kind}; keep one of them"
+            )
         kinds[kind] = name
         if hasattr(get(name, module), "check"):
             try:

@@ -50,9 +50,9 @@ def reject(reason: str) -> NoReturn:
 
 
 def check_beside(tables: Mapping[str, Any], needed: str, excluded: Iterable[str]) -> None:
-    """Reject an effect without the effect that it needs, or beside one that it excludes."""
+    """Reject an effect without the effect that it needs, or together with one that it excludes."""
     if needed not in tables:
-        reject(f"goes with effects.{needed}, which the scene does not name")
+        reject(f"needs effects.{needed}, which the scene does not have")
     for name in excluded:
         if name in tables:
-            reject(f"is not made to stand beside effects.{name}: keep one of them")
+            reject(f"cannot be combined with effects.{name}; keep one of them")

@@ -49,7 +49,7 @@ def parse_table(key: str, text: str) -> dict[str, Any]:
     for angle in angles:
         if [j for j, _, _ in curves[angle]] != advance:
             raise ConfigError(
-                key, f"the J at {angle:g} deg are not those at {angles[0]:g} deg", "the same at each angle"
+                key, f"the J at {angle:g} deg differ from those at {angles[0]:g} deg", "the same at each angle"
             )
     return {
         "advance": advance,
@@ -72,5 +72,5 @@ def _numbers(key: str, number: int, line: str, count: int) -> Sequence[float]:
     except ValueError:
         numbers = [math.nan]
     if not all(map(math.isfinite, numbers)):
-        raise ConfigError(key, f"line {number}: {line!r} has a hole", "a number in each column")
+        raise ConfigError(key, f"line {number}: {line!r} has an empty column", "a number in each column")
     return numbers

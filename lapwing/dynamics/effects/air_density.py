@@ -1,4 +1,4 @@
-"""Air density that falls with altitude."""
+"""Air density as a function of altitude."""
 
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -14,13 +14,13 @@ if TYPE_CHECKING:  # services do not import pydantic
 
 
 class Settings(NamedTuple):
-    """No keys: [environment] has the air, and home's altitude."""
+    """No keys: the air and the altitude of home are in [environment]."""
 
 
 class AirDensity(NamedTuple):
-    """Density of the scene's atmosphere at the vehicle's altitude (theory.md, eq. (2.3)); between exchanges by the
-    tangent.
+    """Density of the scene's atmosphere at the vehicle's altitude (theory.md, eq. (2.3)).
 
+    Linear in altitude within a communication step.
     Source: the International Standard Atmosphere, ISO 2533:1975. Valid to 20 km above the sea.
     """
 

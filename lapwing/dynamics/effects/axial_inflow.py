@@ -1,4 +1,4 @@
-"""Change of the rotors' thrust and torque by air speed along their axes."""
+"""Effect of axial air speed on thrust and torque of the rotors."""
 
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -24,11 +24,11 @@ class Settings(NamedTuple):
 
 
 class AxialInflow(NamedTuple):
-    """Change of the static loads of `rotor_thrust` by climb and descent (theory.md, eq. (2.5)).
+    """Change of the static loads of `rotor_thrust` in climb and descent (theory.md, eq. (2.5)).
 
-    The angle of attack falls with the axial advance per turn over the pitch: T = T_0 (1 - w / speed), and the induced
-    torque with the square, where w = 2 pi V / pitch of each hub's own speed V along the axis, so that roll and pitch
-    are damped. Source: the paper's blade section at the pitch minus the inflow angle, both small. Valid for |w| below
+    The angle of attack decreases with the axial advance per revolution: T = T_0 (1 - w / speed), and the induced torque
+    with the square. w = 2 pi V / pitch uses the axial speed V of each hub, which damps roll and pitch. Source: the
+    paper's blade section with small pitch and inflow angles. Valid for |w| below
     half the rotor speed, to which it is clamped, outside the vortex ring state.
     """
 
@@ -42,7 +42,7 @@ class AxialInflow(NamedTuple):
         validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         if propeller.zero_lift_angle != 0.0:
-            reject("the propeller's zero_lift_angle must be 0: the correction is derived for that")
+            reject("needs a propeller with zero_lift_angle = 0, for which it is derived")
         profile, induced = drag_coefficients(propeller)
         square = math.square(2.0 * math.pi)
         return cls(

@@ -1,4 +1,4 @@
-"""A battery with charge, and voltage sag under load."""
+"""Battery with state of charge and voltage sag."""
 
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -25,9 +25,9 @@ class Settings(NamedTuple):
 
 
 class Battery(NamedTuple):
-    """Lithium-polymer cells in series: open-circuit voltage by charge, less a resistance (theory.md, eq. (2.10)).
+    """Lithium-polymer cells in series: open-circuit voltage of the charge minus an ohmic drop (theory.md, eq. (2.10)).
 
-    The motors get their commanded voltage up to that of the battery. Charge and voltage are updated once per
+    The battery voltage limits the motor voltages. Charge and voltage are updated once per
     communication step. Source: Chen and Rincon-Mora, IEEE Trans. Energy Conversion 21 (2006) 504, open-circuit
     curve; one ohmic resistance, without transient ones. Valid at room temperature, charge above a few per cent.
     """

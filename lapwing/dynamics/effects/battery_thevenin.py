@@ -1,4 +1,4 @@
-"""A battery with transient voltages and temperature, whose motors restart after recovery."""
+"""Battery with transient voltages and temperature; the motors restart when its voltage recovers."""
 
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -44,11 +44,11 @@ class Settings(NamedTuple):
 
 
 class BatteryThevenin(NamedTuple):
-    """Open-circuit voltage by charge, less an ohmic resistance and two with a capacitor beside (theory.md, eq. (2.34)).
+    """Thevenin model: open-circuit voltage, an ohmic resistance and two RC elements in series (theory.md, eq. (2.34)).
 
-    Resistances fall as the pack warms by its own losses. Source: Chen and Rincon-Mora, IEEE Trans. Energy Conversion 21
-    (2006) 504: curve, ratios of the resistances and both time constants, above 20 % of charge; one lump of heat.
-    Currents above 1 C take more charge by Peukert's law, if its exponent is given. The activation temperature, 20
+    Resistances decrease as losses warm the pack. Source: Chen and Rincon-Mora, IEEE Trans. Energy Conversion 21
+    (2006) 504: curve, ratios of the resistances and both time constants, above 20 % of charge; one thermal mass.
+    Currents above 1 C use more charge by Peukert's law, if its exponent is given. The activation temperature, 20
     kJ/mol over the gas constant, and the cooling time are chosen. Valid from -20 to 60 degC. Updated once per
     communication step, exactly for a constant current.
     """

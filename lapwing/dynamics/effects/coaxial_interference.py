@@ -1,4 +1,4 @@
-"""Rotors in the wake of another rotor above them."""
+"""Thrust loss of a rotor in the wake of a rotor above it."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -19,10 +19,10 @@ from lapwing.kernels.codegen import map_tuple
 if TYPE_CHECKING:  # services do not import pydantic
     from lapwing.dynamics.vehicles.airframe import Airframe
 
-CONTRACTED = math.sqrt(0.5)  # radius of the wake over that of the disc
-ASIDE = 1.0 - CONTRACTED  # radii between the axes up to which the whole wake meets the lower disc
-FARTHEST = 2.0  # radii between discs that count as coaxial
-PARALLEL = 0.99  # least cosine between their axes
+CONTRACTED = math.sqrt(0.5)  # radius of the wake over the radius of the disc
+ASIDE = 1.0 - CONTRACTED  # [radii] largest distance of the axes at which the entire wake meets the lower disc
+FARTHEST = 2.0  # [radii] largest distance of coaxial discs along the axis
+PARALLEL = 0.99  # smallest cosine of the angle between coaxial axes
 NOT_BESIDE = ("rotor_quadratic", "rotor_table", "dynamic_inflow")
 
 
@@ -31,30 +31,31 @@ class Settings(NamedTuple):
 
 
 class CoaxialInterference(NamedTuple):
-    """Loss of static loads of a lower rotor in the wake of an upper one (theory.md, eq. (2.43), (2.44)).
+    """Change of thrust and torque of a lower rotor in the wake of an upper rotor (theory.md, eq. (2.43), (2.44)).
 
-    Momentum theory of a lower rotor whose inner half meets twice the upper's induced velocity, for blades of one
-    pitch. Source: Leishman, Principles of Helicopter Aerodynamics, on coaxial rotors, with the wake contracted at the
-    lower disc. Valid near hover; motion carries the wake away. The upper rotor is treated as isolated.
+    Momentum theory for blades of constant pitch. The inner half of the lower disc receives twice the induced velocity
+    of the upper rotor. The upper rotor is modelled as isolated. Source: Leishman, Principles of Helicopter
+    Aerodynamics, coaxial rotors with a contracted wake at the lower disc. Valid near hover: in fast flight the wake
+    passes behind the lower rotor.
     """
 
     thrust_constant: float  # [m^4/rad^2]
-    pitch: float  # of the blades over the induced velocity in hover, both over the rotor's speed
+    pitch: float  # blade pitch over the induced velocity in hover, both divided by the rotor speed
     flow: float  # [m/rad] induced velocity in hover over the rotor's speed
     radius: float  # [m]
-    above: tuple[PerRotor, ...]  # for each rotor: 1 for the rotor in whose wake it lies, 0 for the others
-    distance: PerRotor  # [m] of that one along the axis
+    above: tuple[PerRotor, ...]  # for each rotor: 1 for the rotor above it, 0 for the others
+    distance: PerRotor  # [m] from each rotor to the rotor above it, along the axis
 
     @classmethod
     def from_scene(cls, table: dict, airframe: "Airframe") -> "CoaxialInterference":
-        """Return the parameters of every rotor below another one."""
+        """Return the parameters of all rotors below another rotor."""
         validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
         uppers = _uppers(airframe, radius)
         if all(number < 0 for number, _ in uppers):
-            most = f"{ASIDE * radius:.3g} m aside and {FARTHEST * radius:.3g} m below"
-            reject(f"no rotor stands under another one (by at most {most})")
+            limits = f"{FARTHEST * radius:.3g} m below another with axes at most {ASIDE * radius:.3g} m apart"
+            reject(f"the vehicle has no coaxial rotors; expected a rotor at most {limits}")
         static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
         flow = math.sqrt(0.5 * static / (math.pi * radius * radius))
         if flow >= pitch:
@@ -95,7 +96,7 @@ class CoaxialInterference(NamedTuple):
 
 
 def check(table: Mapping[str, Any], tables: Mapping[str, Any]) -> None:
-    """Check that the scene has `rotor_thrust`, whose loads this effect changes."""
+    """Check that the scene has `rotor_thrust`: this effect changes its loads."""
     check_beside(tables, "rotor_thrust", NOT_BESIDE)
 
 
@@ -150,7 +151,7 @@ def _change(e, both, place):
     along = axial + wash  # [m/s] speed of the wake
     if wash <= 0.0 or along <= 0.0 or speed <= 0.0:
         return 0.0, 0.0
-    drift = distance * across / (along * e.radius)  # [radii] sideways drift of the wake on its way
+    drift = distance * across / (along * e.radius)  # [radii] sideways drift of the wake at the lower disc
     share = min(max((1.0 + CONTRACTED - drift) / (2.0 * CONTRACTED), 0.0), 1.0)
     thrust = inflow.thrust_in_wake(e.pitch, share * wash / (e.flow * speed))
     through = e.pitch - thrust * (e.pitch - 1.0)

@@ -1,4 +1,4 @@
-"""Motors with a winding, instead of a rotor speed that follows the voltage with a lag."""
+"""Direct-current motors with an electrical model, instead of a first-order lag of the rotor speed."""
 
 import math
 from typing import TYPE_CHECKING, Annotated, NamedTuple
@@ -35,13 +35,13 @@ class Settings(NamedTuple):
 class DcMotor(NamedTuple):
     """Direct-current motor behind a belt: J w' = e K (I - I_0) - M, I = (V - K w) / R (theory.md, eq. (2.9), (2.76)).
 
-    The resistance is that of motor and controller, the inertia that of the rotor and, through the belt, of the motor.
-    The controller keeps the current between minus its braking current and the lowest of its own limit, the motor's peak
-    current, its share of what the battery's C rating allows, and that at which the motor takes its peak power. At a
-    limit it applies less than the commanded voltage, and takes that power over its efficiency; while it brakes, it
-    returns power. Source: the usual steady model of a brushless motor, from its speed constant, resistance and idle
-    current; with an inductance L I' = V - K w - R I, exactly for constant voltage and torque. Valid for changes slower
-    than about 1 ms.
+    The resistance includes motor and controller, the inertia the rotor and, through the belt, the motor. The lower
+    limit of the current is minus the braking current of the controller. The upper limit is the lowest of the
+    controller's limit, the motor's peak current, the motor's share of the battery's C rating, and the current at the
+    motor's peak power. At a limit the controller reduces the voltage; it draws that power divided by its efficiency,
+    and returns power while it brakes. Source: the usual steady model of a brushless motor with speed constant,
+    resistance and idle current; with an inductance L I' = V - K w - R I, solved exactly for constant voltage and
+    torque. Valid for changes slower than about 1 ms.
     """
 
     motor_constant: float  # [N m/A] = [V s/rad] K at the rotor, after the belt

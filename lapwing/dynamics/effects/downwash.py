@@ -1,4 +1,4 @@
-"""Downwash of the vehicles of a fleet on those below."""
+"""Downwash of the vehicles of a fleet on vehicles below."""
 
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -23,11 +23,11 @@ class Settings(NamedTuple):
 
 
 class Downwash(NamedTuple):
-    """The jet of each other vehicle that names it, as a wind (theory.md, eq. (2.62) to (2.64)).
+    """Wind in the jet of each other vehicle that has this effect (theory.md, eq. (2.62) to (2.64)).
 
-    One jet for all rotors of a vehicle, against their thrust: the developed jet has twice the induced velocity of
-    momentum theory, a Gauss profile whose width grows with the distance, and the momentum of the thrust. It acts
-    through the effects that know the air's speed (body_drag, axial_inflow, dynamic_inflow). Source: Leishman,
+    All rotors of a vehicle form one jet, opposite to their thrust. The developed jet has twice the induced velocity of
+    momentum theory, a Gaussian profile whose width grows with the distance, and the momentum of the thrust. It acts
+    through the effects that use the air velocity (body_drag, axial_inflow, dynamic_inflow). Source: Leishman,
     Principles of Helicopter Aerodynamics, on the wake in hover; Pope, Turbulent Flows, section 5.1, on the round jet,
     whose half width grows by 0.094 m per metre; Bauersfeld et al., IEEE Robotics and Automation Letters 10 (2025), who
     measured a jet from 2.5 distances of opposite rotors below a quadrotor on (`core`). Valid near hover, below by more

@@ -31,8 +31,8 @@ class Settings(NamedTuple):
 class DynamicInflow(NamedTuple):
     """Change of the static loads of `rotor_thrust` by the flow through the rotor (theory.md, eq. (2.35), (2.36)).
 
-    The blades meet the axial air speed of the rotor plus the flow that it induces: momentum theory in climb and
-    forward flight (Glauert), its fit to measurements in descent, times the propeller's induced power factor. Sources:
+    The inflow is the axial air speed plus the induced velocity: momentum theory in climb and forward flight (Glauert),
+    a fit to measurements in descent, multiplied by the propeller's induced power factor. Sources:
     Leishman, Principles of Helicopter Aerodynamics, section 2.13; time constant of the flow: Carpenter and Fridovich,
     NACA TN 3044 (1953). Valid for blades that do not stall; updated once per communication step. In the vortex ring
     state it is the mean flow; `vortex_ring` adds loss and fluctuation.

@@ -14,13 +14,13 @@ KIND = "gravity"
 
 
 class Settings(NamedTuple):
-    """No keys: [environment] has gravity."""
+    """No keys: gravity is in [environment]."""
 
 
 class Gravity(NamedTuple):
     """Weight m g down (theory.md, eq. (2.1)).
 
-    Source: the scene's gravity at sea level, wherever the vehicle is. Valid to 0.03 % within 1 km of the sea level;
+    Source: the scene's gravity at sea level, independent of position. Valid to 0.03 % within 1 km of the sea level;
     `gravity_altitude` beyond that.
     """
 

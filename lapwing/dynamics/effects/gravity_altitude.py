@@ -1,4 +1,4 @@
-"""Gravity that weakens with altitude."""
+"""Gravity as a function of altitude."""
 
 from typing import TYPE_CHECKING, NamedTuple
 
@@ -16,14 +16,14 @@ KIND = "gravity"
 
 
 class Settings(NamedTuple):
-    """No keys: [environment] has gravity, and home's altitude."""
+    """No keys: gravity and the altitude of home are in [environment]."""
 
 
 class GravityAltitude(NamedTuple):
     """Weight m g (R / (R + h))^2 down (theory.md, eq. (2.2)).
 
-    Source: Newton's law with the radius of the U.S. Standard Atmosphere 1976; updated once per exchange interval. Valid
-    within the atmosphere.
+    Source: Newton's law with the radius of the U.S. Standard Atmosphere 1976; updated once per communication step.
+    Valid within the atmosphere.
     """
 
     acceleration: float = STANDARD_GRAVITY  # [m/s^2] at sea level

@@ -42,7 +42,7 @@ class HForce(NamedTuple):
         settings = validate_table(Settings, table)
         positions = airframe.rotors.position
         if len({z for _, _, z in positions}) > 1 and not airframe.rotors.tilted_axis:
-            reject("the rotors must all be at one height")
+            reject("needs rotors at one height")
         coefficient = settings.coefficient
         if coefficient is None:
             propeller = airframe.propeller or reject("needs the key coefficient: the vehicle has no [propeller]")

@@ -1,4 +1,4 @@
-"""A payload that is let go."""
+"""Payload that is released in flight."""
 
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -25,10 +25,10 @@ class Settings(NamedTuple):
 
 
 class PayloadRelease(NamedTuple):
-    """A uniform box; once it is released the vehicle has neither its mass nor its inertia.
+    """Uniform box whose mass and inertia the vehicle loses at its release.
 
-    It is where the airframe's [payload] says, and the centre of mass moves when it goes (theory.md, eqs. (2.41) and
-    (2.42)); without that table at the centre of mass, which stays (theory.md, eq. (2.26)). Source: the payload of
+    The airframe's [payload] sets its position, and the release moves the centre of mass (theory.md, eqs. (2.41) and
+    (2.42)). Without that table the box is at the centre of mass (theory.md, eq. (2.26)). Source: the payload of
     Pappalardo et al. 2023, Table 2, size chosen; Steiner's theorem. Valid for a payload released at rest relative to
     the vehicle.
     """
@@ -44,7 +44,7 @@ class PayloadRelease(NamedTuple):
         release = float("inf") if settings.release_time is None else settings.release_time
         if airframe.payload:
             if twice := {"mass", "size"} & set(table):
-                raise ConfigError(min(twice), "stands beside the table airframe.payload", "one of them")
+                raise ConfigError(min(twice), "set together with airframe.payload", "one of them")
             return cls(release, *_with_and_without(airframe))
         mass, total = airframe.mass.payload if settings.mass is None else settings.mass, airframe.mass.total
         if mass >= total:
@@ -55,7 +55,7 @@ class PayloadRelease(NamedTuple):
         rest = (inertia[0] - box[0], inertia[1] - box[1], inertia[2] - box[2])
         moments = principal_moments(rest, products)
         if moments[0] <= 0.0 or moments[2] > moments[0] + moments[1]:
-            reject("takes more inertia than the vehicle has: make its mass or size smaller")
+            reject("has more inertia than the vehicle; reduce its mass or size")
         return cls(release, body_of(total, inertia, products), body_of(total - mass, rest, products))
 
     def initial_discrete_state(self) -> tuple[float]:

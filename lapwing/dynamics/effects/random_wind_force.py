@@ -1,4 +1,4 @@
-"""Random force: the paper's wind, as a force of random size instead of a motion of the air."""
+"""Random force on the vehicle: the wind model of the paper, without a motion of the air."""
 
 import math
 import zlib
@@ -36,13 +36,14 @@ class Settings(NamedTuple):
 
 
 class RandomWindForce(NamedTuple):
-    """A random force 1/2 C_s S rho |v| v at the centre of mass, of a wind's speed v past the vehicle (theory.md, eq.
-    (2.8)); the air that other effects feel stands still.
+    """Random force 1/2 C_s S rho |v| v at the centre of mass for a relative wind v (theory.md, eq. (2.8)).
+
+    Other effects see still air.
 
     The wind is the mean plus one normal draw per axis and interval; over a communication step the force is held at
     its mean. Source: Pappalardo et al. 2023, section 6.1. Valid as a disturbance, not as turbulence (`wind_dryden`):
-    the draws are independent, so that the wind's spectrum is flat, sigma^2 times the interval, up to the interval's
-    frequency. As it is drag already, it is refused beside `body_drag`.
+    the draws are independent, so the wind's spectrum is flat (sigma^2 times the interval) up to the interval's
+    frequency. The force includes drag, so `body_drag` is rejected in the same scene.
     """
 
     mean: Vec3  # [m/s] world
@@ -69,7 +70,7 @@ class RandomWindForce(NamedTuple):
 def check(table: Mapping, tables: Mapping) -> None:
     """Raise ConfigError in combination with `body_drag`, unless the table allows it."""
     if "body_drag" in tables and not table.get("allow_body_drag"):
-        message = "is drag already, and counts it twice beside effects.body_drag"
+        message = "includes drag, which effects.body_drag would count twice"
         expected = "wind_constant or wind_dryden with body_drag, or allow_body_drag = true"
         raise ConfigError("", message, expected)
 

@@ -1,4 +1,4 @@
-"""Torque of the air against the vehicle's rotation."""
+"""Aerodynamic damping of the vehicle's rotation."""
 
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -21,11 +21,11 @@ class Settings(NamedTuple):
 
 
 class RotationalDrag(NamedTuple):
-    """A torque -c omega about each body axis, relative to the air (theory.md, eq. (2.66)).
+    """Torque -c omega about each body axis, relative to the air (theory.md, eq. (2.66)).
 
     It lumps the damping of the rotors, whose inflow changes as the vehicle rolls and pitches, and of the fuselage.
     Source: the damping derivatives L_p, M_q, N_r of flight mechanics; identified from flights. Valid for rates at
-    which the inflow stays small beside the induced velocity. Beside `axial_inflow` it adds to the damping there.
+    which the change of inflow is small compared with the induced velocity. Adds to the damping of `axial_inflow`.
     """
 
     linear: Vec3  # [N m s/rad]

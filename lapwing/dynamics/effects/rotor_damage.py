@@ -1,4 +1,4 @@
-"""A propeller that is damaged or lost in flight."""
+"""Propeller damage or loss in flight."""
 
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -25,10 +25,10 @@ class Settings(NamedTuple):
 
 
 class RotorDamage(NamedTuple):
-    """From a moment on one rotor has only a part of its thrust and torque (theory.md, eq. (2.27)).
+    """Reduction of thrust and torque of one rotor from a given time on (theory.md, eq. (2.27)).
 
-    Source: the definition. Valid for a torn or lost blade as far as its mean loads go: imbalance and vibration are
-    left out, and the motor goes on turning.
+    Source: the definition. Valid for the mean loads of a torn or lost blade, without imbalance and vibration; the
+    motor continues to turn.
     """
 
     time: float  # [s]

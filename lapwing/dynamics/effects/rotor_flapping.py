@@ -1,4 +1,4 @@
-"""Blades that flap: the discs of rotors tilt back from the wind across their axis."""
+"""Blade flapping: rotor discs tilt away from a transverse wind."""
 
 import math
 from typing import TYPE_CHECKING, Annotated, NamedTuple
@@ -29,11 +29,11 @@ class Settings(NamedTuple):
 
 
 class RotorFlapping(NamedTuple):
-    """A disc tilts back by a_1 = k mu / (1 - mu^2 / 2), mu = V / (w R), and its thrust with it (theory.md, eq. (2.38)).
+    """Tilt of disc and thrust by a_1 = k mu / (1 - mu^2 / 2), mu = V / (w R) (theory.md, eq. (2.38)).
 
-    A stiff hub hands the tilt on as a moment. k = 4 theta_t - 2 lambda of blades with ideal twist, at the inflow of
+    A stiff hub transmits the tilt as a moment. k = 4 theta_t - 2 lambda for blades with ideal twist, at the inflow of
     hover. Source: Pounds, Mahony and Corke, Control Engineering Practice 18 (2010) 691; Leishman, section 4.
-    Valid for advance ratios below 0.3. Beside `h_force` with a coefficient that includes flapping it counts twice.
+    Valid for advance ratios below 0.3. An `h_force` coefficient that includes flapping would count it twice.
     """
 
     coefficient: float  # [rad]

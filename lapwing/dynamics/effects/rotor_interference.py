@@ -1,4 +1,4 @@
-"""Rotors behind or beside others in forward flight, in the flow that these induce."""
+"""Interference of neighbouring rotors in forward flight."""
 
 from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -30,7 +30,7 @@ class Settings(NamedTuple):
 
 
 class RotorInterference(NamedTuple):
-    """Change of static loads by the flow that the other rotors induce (theory.md, eq. (2.73) to (2.75)).
+    """Change of static loads by the induced flow of the other rotors (theory.md, eq. (2.73) to (2.75)).
 
     Source: skewed cylinder of vortex rings of Castles and De Leeuw, NACA TR 1184 (1954), its mean over each disc; flow
     of each rotor by Glauert; blades of one pitch as in `dynamic_inflow`. Zero in hover. Valid for rotors in one plane,
@@ -69,7 +69,7 @@ class RotorInterference(NamedTuple):
                     row.append((0.0, 0.0, -1))
                     continue
                 if distance < NEAREST * radius:
-                    reject("rotors that lie over each other have effects.coaxial_interference")
+                    reject("the vehicle has coaxial rotors; use effects.coaxial_interference")
                 known = [n for n, d in enumerate(distances) if abs(d - distance) < SAME]
                 if not known:
                     distances.append(distance)

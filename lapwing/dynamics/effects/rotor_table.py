@@ -1,4 +1,4 @@
-"""Measured thrust and torque of the rotors: coefficients over the advance ratio and the angle of the air."""
+"""Measured thrust and torque of the rotors: coefficients over advance ratio and inflow angle."""
 
 import itertools
 from collections.abc import Mapping
@@ -43,10 +43,11 @@ class Settings(NamedTuple):
 
 
 class RotorTable(NamedTuple):
-    """T = C_T rho n^2 D^4, Q = C_P rho n^2 D^5 / (2 pi) with coefficients by a table (theory.md, eq. (2.37)).
+    """T = C_T rho n^2 D^4, Q = C_P rho n^2 D^5 / (2 pi) with coefficients from a table (theory.md, eq. (2.37)).
 
-    Linear between its rows, held beyond. With one angle the advance ratio is that of the air along the axis, with
-    several it is that of the whole air speed, with its angle. Source: the measurements. Valid within the table.
+    Linear interpolation, constant beyond the first and last row. A table with one angle uses the axial air speed for
+    the advance ratio; a table with several angles uses the total air speed and its angle. Source: the measurements.
+    Valid within the table.
     """
 
     advance: np.ndarray  # (n,)
@@ -79,7 +80,7 @@ def check(table: Mapping[str, Any], tables: Mapping[str, Any]) -> None:
     """Check that no other effect defines the rotors' thrust and torque."""
     for name in INSTEAD_OF:
         if name in tables:
-            reject(f"stands for effects.{name}: keep one of them")
+            reject(f"replaces effects.{name}; keep one of them")
 
 
 def embed(table: dict[str, Any], folder: Path) -> None:
@@ -87,7 +88,7 @@ def embed(table: dict[str, Any], folder: Path) -> None:
     if not isinstance(file := table.get("file"), str):
         return
     if settings := {"advance", "angle_deg", "thrust", "power"} & set(table):
-        raise ConfigError(min(settings), "stands beside file", "one of them")
+        raise ConfigError(min(settings), "set together with file", "one of them")
     path = folder / file
     try:
         table.update(parse_table("file", read_text(path)))
@@ -105,15 +106,13 @@ def _check(settings: Settings) -> None:
     for name, values in (("advance", j), ("angle_deg", angles)):
         for before, after in itertools.pairwise(values):
             if after <= before:
-                raise ConfigError(name, f"got {after:g} after {before:g}", "growing numbers")
+                raise ConfigError(name, f"got {after:g} after {before:g}", "increasing numbers")
     for before, after in itertools.pairwise(j):
         if after - before > WIDEST:
-            raise ConfigError(
-                "advance", f"there is nothing between J = {before:g} and {after:g}", f"gaps up to {WIDEST:g}"
-            )
+            raise ConfigError("advance", f"no row between J = {before:g} and {after:g}", f"gaps up to {WIDEST:g}")
     if 0.0 not in j or len(j) < 2:
         raise ConfigError(
-            "advance", f"got J from {j[0]:g} to {j[-1]:g}", "two rows or more, J = 0 (at rest) among them"
+            "advance", f"got J from {j[0]:g} to {j[-1]:g}", "at least two rows, including J = 0 (at rest)"
         )
     for name, curves in (("thrust", settings.thrust), ("power", settings.power)):
         if [len(curve) for curve in curves] != [len(j)] * len(angles):

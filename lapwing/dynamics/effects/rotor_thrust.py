@@ -33,7 +33,7 @@ class RotorThrust(NamedTuple):
     def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorThrust":
         """Return the parameters of the airframe's propeller."""
         validate_table(Settings, table)
-        propeller = airframe.propeller or reject("the vehicle has no [propeller]; name rotor_quadratic instead")
+        propeller = airframe.propeller or reject("the vehicle has no [propeller]; use rotor_quadratic")
         square = math.square(2.0 * math.pi)
         return cls(
             thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / square,

@@ -1,4 +1,4 @@
-"""A load that several vehicles of a fleet carry by cables."""
+"""Load carried by several vehicles of a fleet with cables."""
 
 from typing import TYPE_CHECKING, Annotated, NamedTuple
 
@@ -31,11 +31,11 @@ class Settings(NamedTuple):
 
 
 class SharedSlungLoad(NamedTuple):
-    """Force of the cable to the load that the vehicles share (theory.md, eq. (1.20), (1.23)).
+    """Force of the cable to the shared load (theory.md, eq. (1.20), (1.23)).
 
-    Source: Newton's laws, Hooke's and a damper for a cable that only pulls. Load and vehicles are
-    integrated separately; each extrapolates the other from the beginning of the communication step with its
-    acceleration then. Valid while the frequency of the cable times the communication step is below 0.5.
+    Source: Newton's laws; Hooke's law and a damper for a cable that only pulls. Load and vehicles are integrated
+    separately. Each extrapolates the motion of the other from its acceleration at the start of the communication step.
+    Valid while the frequency of the cable times the communication step is below 0.5.
     """
 
     sling: Sling

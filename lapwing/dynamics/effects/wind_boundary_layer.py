@@ -1,4 +1,4 @@
-"""Wind that grows with the height over the ground."""
+"""Wind that increases with height above the ground."""
 
 from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
 
@@ -25,7 +25,7 @@ class Settings(NamedTuple):
 
 
 class WindBoundaryLayer(NamedTuple):
-    """A steady wind with the logarithmic profile of the neutral surface layer (theory.md, eq. (2.32)).
+    """Steady wind with the logarithmic profile of the neutral surface layer (theory.md, eq. (2.32)).
 
     Source: Stull, An Introduction to Boundary Layer Meteorology (1988), section 9.7. Valid to about 100 m over ground
     of uniform roughness, not between obstacles.

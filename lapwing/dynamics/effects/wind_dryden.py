@@ -22,7 +22,7 @@ class WindDryden(NamedTuple):
 
     Source: MIL-F-8785C, low-altitude model (the spectra of MIL-HDBK-1797 are the same, written with halved lateral and
     vertical scales). Valid from 10 to 1000 feet above the ground; beyond, the values at the limits apply. Sampled
-    exactly at each exchange for height and airspeed then, held over the interval.
+    exactly once per communication step for the current height and airspeed, and held.
     """
 
     conditions: Conditions

@@ -49,10 +49,11 @@ class Settings(NamedTuple):
 
 
 class WindDrydenRates(NamedTuple):
-    """The gusts of `wind_dryden`, bit-for-bit, and rates of the air with their spectra (theory.md, eq. (2.39)).
+    """Gusts of `wind_dryden`, bit-for-bit identical, and angular rates of the air (theory.md, eq. (2.39)).
 
-    Rotors feel the air's rate at their hubs. Source: MIL-F-8785C, section 3.7.5: p has its own filter, q and r follow
-    from the passing transverse gusts. Valid as `wind_dryden`. Sampled exactly at each exchange, held over the interval.
+    The rates change the air velocity at the rotor hubs. Source: MIL-F-8785C, section 3.7.5: p has its own filter, q and
+    r follow from the passing transverse gusts. Valid as `wind_dryden`. Sampled exactly once per communication step, and
+    held.
     """
 
     conditions: Conditions

@@ -24,8 +24,8 @@ class WindVonKarman(NamedTuple):
 
     Source: MIL-F-8785C, low-altitude model. A sum of four independent Dryden turbulences of falling scale, whose
     spectra are within 2.1 % of von Karman's up to 300 times the corner frequency. Valid from 10 to 1000 feet above the
-    ground; beyond, the values at the limits apply. Sampled exactly at each exchange for height and airspeed then, held
-    over the interval.
+    ground; beyond, the values at the limits apply. Sampled exactly once per communication step for the current height
+    and airspeed, and held.
     """
 
     conditions: Conditions

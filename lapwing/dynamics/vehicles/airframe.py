@@ -46,7 +46,7 @@ class Airframe(Section):
     @model_validator(mode="after")
     def _one_payload(self) -> "Airframe":
         if self.payload and self.mass.payload:
-            message = f"got {self.mass.payload:g} beside a table [payload], of which [mass] has nothing"
+            message = f"got {self.mass.payload:g} together with a table [payload], which [mass] does not include"
             raise ConfigError("mass.payload", message, "0")
         return self
 

@@ -135,7 +135,7 @@ def write_airframe(
         state = ", not determined by the flights" if key in identification.fit.undetermined else ""
         lines.append(f"# {key} = {value:.6g}, standard error {error:.2g}{state}")
     if others:
-        lines.append("# For the scene, beside vehicle.airframe:")
+        lines.append("# For the scene, in addition to vehicle.airframe:")
         lines += [f"#   {key} = {value:.9g}" for key, value in others.items()]
     text = "\n".join(lines) + "\n\n" + dump(table)
     tomllib.loads(text)

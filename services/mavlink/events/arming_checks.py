@@ -83,9 +83,9 @@ FAILED = {  # event and component by the beginning of the reason
     status_texts.NOT_STARTED: (_check("check_started", "The estimator has not started"), "attitude_estimate"),
     status_texts.POSITION_UNCERTAIN: (_check("check_position", "The position is uncertain"), "local_position_estimate"),
     status_texts.ATTITUDE_UNCERTAIN: (_check("check_attitude", "The attitude is uncertain"), "attitude_estimate"),
-    status_texts.NOT_LEVEL: (_check("check_level", "The vehicle does not stand level"), "none"),
+    status_texts.NOT_LEVEL: (_check("check_level", "The vehicle is not level"), "none"),
     status_texts.BATTERY_LOW: (_check("check_battery", "The battery is low"), "battery"),
-    status_texts.OUTSIDE_FENCE: (_check("check_fence", "The vehicle stands outside of the fence"), "none"),
+    status_texts.OUTSIDE_FENCE: (_check("check_fence", "The vehicle is outside the fence"), "none"),
 }
 OTHER = _check("check_other", "The vehicle cannot be armed"), "none"
 _READINGS = {status_texts.NO_READINGS.format(source): source for source in SOURCES}

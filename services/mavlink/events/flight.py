@@ -9,7 +9,7 @@ from lapwing.services.mavlink.vehicle_cache import VehicleCache
 ON_GROUND, NO_TAKEOFF, IN_AIR = range(3)
 _PLACES = (
     Entry(ON_GROUND, "on_ground", "on the ground"),
-    Entry(NO_TAKEOFF, "no_takeoff", "nobody took off"),
+    Entry(NO_TAKEOFF, "no_takeoff", "no takeoff after arming"),
     Entry(IN_AIR, "in_air", "in the air"),
 )
 MODES = tuple(

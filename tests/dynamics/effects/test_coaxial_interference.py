@@ -134,10 +134,10 @@ def test_load_changes_equal_those_of_plant(drone, velocity):
 @pytest.mark.parametrize(
     ("frame", "tables", "message"),
     [
-        (lambda d: d, {}, "effects.coaxial_interference: no rotor stands under another one"),
-        (lambda d: stacked(d, aside=0.2), {}, "effects.coaxial_interference: no rotor stands under another one"),
-        (lambda d: stacked(d, gap=0.7), {}, "effects.coaxial_interference: no rotor stands under another one"),
-        (stacked, {"dynamic_inflow": {}}, "effects.coaxial_interference: is not made to stand beside effects.dynamic"),
+        (lambda d: d, {}, "effects.coaxial_interference: the vehicle has no coaxial rotors"),
+        (lambda d: stacked(d, aside=0.2), {}, "effects.coaxial_interference: the vehicle has no coaxial rotors"),
+        (lambda d: stacked(d, gap=0.7), {}, "effects.coaxial_interference: the vehicle has no coaxial rotors"),
+        (stacked, {"dynamic_inflow": {}}, "effects.coaxial_interference: cannot be combined with effects.dynamic"),
     ],
 )
 def test_invalid_combinations_are_rejected(drone, frame, tables, message):
@@ -146,7 +146,7 @@ def test_invalid_combinations_are_rejected(drone, frame, tables, message):
 
 
 def test_effect_without_rotor_thrust_is_rejected(drone):
-    with pytest.raises(ValueError, match=r"effects.coaxial_interference: goes with effects\.rotor_thrust"):
+    with pytest.raises(ValueError, match=r"effects.coaxial_interference: needs effects\.rotor_thrust"):
         effects.from_scene({"coaxial_interference": {}}, stacked(drone))
 
 

@@ -32,7 +32,7 @@ def test_payload_is_released_once_at_its_time(drone):
     [
         ({"mass": 11.0}, r"effects.payload_release.mass: expected less than the vehicle's 10.0224 kg, got 11.0"),
         ({"mass": -1.0}, r"effects.payload_release.mass: expected a number above 0 \[kg\], got -1.0"),
-        ({"mass": 9.0, "size": [2.0, 2.0, 2.0]}, r"effects.payload_release: takes more inertia"),
+        ({"mass": 9.0, "size": [2.0, 2.0, 2.0]}, r"effects.payload_release: has more inertia"),
     ],
 )
 def test_invalid_payload_is_rejected(drone, table, message):

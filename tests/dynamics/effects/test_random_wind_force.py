@@ -87,6 +87,6 @@ def test_short_ticks_share_draws_and_long_ticks_average_them(drone, situation, r
 
 
 def test_drag_is_not_counted_twice(drone):
-    with pytest.raises(ValueError, match=r"^effects.random_wind_force: is drag already.*allow_body_drag = true"):
+    with pytest.raises(ValueError, match=r"^effects.random_wind_force: includes drag.*allow_body_drag = true"):
         effects.from_scene({"random_wind_force": {}, "body_drag": {}}, drone)
     assert len(effects.from_scene({"random_wind_force": {"allow_body_drag": True}, "body_drag": {}}, drone)) == 2

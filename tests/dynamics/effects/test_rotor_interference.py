@@ -146,7 +146,7 @@ def test_blades_and_discs_agree(drone, situation):
 
 def test_coaxial_rotors_and_other_models_are_rejected(drone):
     over = drone.rotors.model_copy(update={"position": ((0.3, 0, 0), (0.3, 0, 0.1), (-0.3, 0, 0), (-0.3, 0, 0.1))})
-    with pytest.raises(ConfigError, match=r"lie over each other have effects.coaxial_interference"):
+    with pytest.raises(ConfigError, match=r"coaxial rotors; use effects.coaxial_interference"):
         make(drone.model_copy(update={"rotors": over}))
-    with pytest.raises(ConfigError, match=r"goes with effects.rotor_thrust"):
+    with pytest.raises(ConfigError, match=r"needs effects.rotor_thrust"):
         effects.from_scene({"rotor_interference": {}}, drone)

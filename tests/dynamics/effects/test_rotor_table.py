@@ -67,7 +67,7 @@ def test_each_hub_has_its_advance_and_rotors_at_rest_have_no_loads(drone, situat
         ("J,CT,CP\n0,0.1,0.04\n0.2,,0.03\n", "line 3: '0.2,,0.03' has a hole"),
         ("J CT CP\n0 0.1 0.04\n0.2 nan 0.03\n", "has a hole"),
         ("J CT eta\n0 0.1 0.04\n", "names 0 columns CP or CQ"),
-        ("J CT CP\n0 0.1 0.04\n0.2 0.09 0.04\n0.1 0.1 0.04\n", "growing numbers, got 0.1 after 0.2"),
+        ("J CT CP\n0 0.1 0.04\n0.2 0.09 0.04\n0.1 0.1 0.04\n", "increasing numbers, got 0.1 after 0.2"),
         ("J CT CP\n0 0.1 0.04\n0.2 0.09 0.04\n0.6 0.1 0.04\n", "nothing between J = 0.2 and 0.6"),
         ("J CT CP\n0.1 0.1 0.04\n0.2 0.09 0.04\n", r"J = 0 \(at rest\) among them, got J from 0.1 to 0.2"),
         ("J CT CP\n0 -0.1 0.04\n0.2 0.09 0.04\n", "above 0 there, got -0.1 at J = 0"),
@@ -83,5 +83,5 @@ def test_table_error_is_one_line(drone, tmp_path, text, output):
 
 
 def test_rotor_table_replaces_other_rotor_effects(drone):
-    with pytest.raises(ConfigError, match=r"effects.rotor_table: stands for effects.rotor_thrust"):
+    with pytest.raises(ConfigError, match=r"effects.rotor_table: replaces effects.rotor_thrust"):
         effects.from_scene({"rotor_thrust": {}, "rotor_table": {}}, drone)

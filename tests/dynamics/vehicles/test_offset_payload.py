@@ -195,9 +195,9 @@ def test_invalid_scene_payload_is_rejected(overrides, message):
             {},
             {},
             {"mass": 1.0},
-            "effects.payload_release.mass: stands beside the table airframe.payload; expected one of them",
+            "effects.payload_release.mass: set together with airframe.payload; expected one of them",
         ),
-        ({}, {}, {"size": [1.0, 1.0, 1.0]}, "effects.payload_release.size: stands beside the table airframe.payload"),
+        ({}, {}, {"size": [1.0, 1.0, 1.0]}, "effects.payload_release.size: set together with airframe.payload"),
     ],
 )
 def test_invalid_payload_is_rejected(tmp_path, mass, payload, table, message):

@@ -231,7 +231,7 @@ def test_arming_checks_are_reported_in_protocol_order():
     assert one.texts("arming_check")[1:] == [
         "No good readings of the gps",
         "The battery is low",
-        "The vehicle does not stand level",
+        "The vehicle is not level",
         "The vehicle cannot be armed",
     ]
     messages = one.station.all("EVENT")

@@ -237,9 +237,9 @@ def test_orbit_failures_and_log(tmp_path):
 
 def test_events_and_arming_checks_are_read():
     async def story(drone, vehicle):
-        vehicle.arming_blockers = ("the vehicle does not stand level",)
+        vehicle.arming_blockers = ("the vehicle is not level",)
         report = await first(drone.events.health_and_arming_checks(), lambda report: report.all_problems)
-        assert [problem.message for problem in report.all_problems] == ["The vehicle does not stand level"]
+        assert [problem.message for problem in report.all_problems] == ["The vehicle is not level"]
         assert not report.current_mode_intention.can_arm_or_run
         assert {"gyro", "gps", "battery", "attitude_estimate"} <= {c.name for c in report.health_components}
         vehicle.arming_blockers = ()
