@@ -102,7 +102,7 @@ class Flight(FlightData):
         """Write the report: a page for a browser (.html), or its plots (.pdf, .png).
 
         Args:
-            path: path of the report; by default .html beside the log, or SCENE.html here for a flight in memory.
+            path: path of the report; by default .html next to the log, or SCENE.html here for a flight in memory.
             compare_with: second flight, drawn over this one in every plot.
             view3d: True to include the 3D view if viser is installed (`pip install lapwing[view3d]`).
 

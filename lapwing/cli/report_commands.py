@@ -17,7 +17,7 @@ def report(
         Path | None, typer.Argument(metavar="[FILE]", help="second log, drawn over the first in every plot")
     ] = None,
     out: Annotated[
-        Path | None, typer.Option(metavar="FILE.html|pdf|png", help="report [next to the first log, .html]")
+        Path | None, typer.Option(metavar="FILE.html|pdf|png", help="report [.html next to the first log]")
     ] = None,
     vehicle: Annotated[str | None, typer.Option(metavar="NAME", help="vehicle to report [first in the log]")] = None,
     names: Annotated[

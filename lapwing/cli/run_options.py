@@ -35,9 +35,7 @@ class RunOptions(LinkOptions):
         str, typer.Option(metavar="multi-process|single-process", help="a process for each service, or one for all")
     ] = MULTI_PROCESS
     log: Annotated[Path | None, typer.Option(metavar="FILE", help="MCAP log [recordings/SCENE_TIME.mcap]")] = None
-    report: Annotated[
-        Path | None, typer.Option(metavar="FILE.html|pdf|png", help="report [next to the log, .html]")
-    ] = None
+    report: Annotated[Path | None, typer.Option(metavar="FILE.html|pdf|png", help="report [.html next to log]")] = None
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the results as JSON")] = None
     view: Annotated[bool, typer.Option("--view", help="show the flight live in the browser")] = False
     run_: Annotated[int | None, typer.Option("--run", metavar="N", help="repeat run N of --campaign")] = None

@@ -136,7 +136,9 @@ def test_unknown_effect_lists_choices():
 
 
 def test_effects_of_equal_kind_exclude_each_other():
-    with pytest.raises(ValueError, match=r"effects.gravity_altitude: excludes effects.gravity, both are a gravity"):
+    with pytest.raises(
+        ValueError, match=r"effects.gravity_altitude: cannot be combined with effects.gravity, also a gravity"
+    ):
         effects.from_scene({"gravity": {}, "gravity_altitude": {}}, DRONE)
 
 

@@ -72,5 +72,5 @@ def _numbers(key: str, number: int, line: str, count: int) -> Sequence[float]:
     except ValueError:
         numbers = [math.nan]
     if not all(map(math.isfinite, numbers)):
-        raise ConfigError(key, f"line {number}: {line!r} has an empty column", "a number in each column")
+        raise ConfigError(key, f"line {number}: {line!r} has no number in a column", "a number in each column")
     return numbers

@@ -96,7 +96,7 @@ def test_out_of_range_values_are_rejected(drone, table, text):
 
 
 def test_two_batteries_are_rejected(drone):
-    with pytest.raises(ConfigError, match=r"excludes effects.battery, both are a battery model"):
+    with pytest.raises(ConfigError, match=r"cannot be combined with effects.battery, also a battery model"):
         effects.from_scene({"battery": {}, "battery_thevenin": {}}, drone)
 
 

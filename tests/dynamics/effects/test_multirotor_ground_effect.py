@@ -107,5 +107,5 @@ def test_effect_sleeps_only_without_influence(drone, situation):
 
 
 def test_excludes_ground_effect_of_separate_rotors(drone):
-    with pytest.raises(ValueError, match=r"excludes effects.ground_effect, both are a ground effect model"):
+    with pytest.raises(ValueError, match=r"cannot be combined with effects.ground_effect, also a ground effect model"):
         effects.from_scene({"ground_effect": {}, "multirotor_ground_effect": {}}, drone)

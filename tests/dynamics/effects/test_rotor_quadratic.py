@@ -13,7 +13,7 @@ def test_loads_are_quadratic_in_speed(drone, situation):
 
 
 def test_excludes_other_model(drone):
-    with pytest.raises(ValueError, match=r"effects.rotor_thrust: excludes effects.rotor_quadratic"):
+    with pytest.raises(ValueError, match=r"effects.rotor_thrust: cannot be combined with effects.rotor_quadratic"):
         effects.from_scene(
             {"rotor_thrust": {}, "rotor_quadratic": {"thrust_constant": 1.0, "torque_constant": 1.0}}, drone
         )

@@ -64,15 +64,15 @@ def test_each_hub_has_its_advance_and_rotors_at_rest_have_no_loads(drone, situat
     ("text", "output"),
     [
         ("J CT CP\n0 0.1 0.04\n0.2 0.08\n", "line 3 has 2 columns; expected 3|expected 3 as its first line"),
-        ("J,CT,CP\n0,0.1,0.04\n0.2,,0.03\n", "line 3: '0.2,,0.03' has a hole"),
-        ("J CT CP\n0 0.1 0.04\n0.2 nan 0.03\n", "has a hole"),
+        ("J,CT,CP\n0,0.1,0.04\n0.2,,0.03\n", "line 3: '0.2,,0.03' has no number in a column"),
+        ("J CT CP\n0 0.1 0.04\n0.2 nan 0.03\n", "has no number in a column"),
         ("J CT eta\n0 0.1 0.04\n", "names 0 columns CP or CQ"),
         ("J CT CP\n0 0.1 0.04\n0.2 0.09 0.04\n0.1 0.1 0.04\n", "increasing numbers, got 0.1 after 0.2"),
         ("J CT CP\n0 0.1 0.04\n0.2 0.09 0.04\n0.6 0.1 0.04\n", "nothing between J = 0.2 and 0.6"),
         ("J CT CP\n0.1 0.1 0.04\n0.2 0.09 0.04\n", r"J = 0 \(at rest\) among them, got J from 0.1 to 0.2"),
         ("J CT CP\n0 -0.1 0.04\n0.2 0.09 0.04\n", "above 0 there, got -0.1 at J = 0"),
         ("J CT CP\n0 10.1 0.04\n0.2 0.09 0.04\n", "at least -1 and at most 1, got 10.1"),
-        ("angle J CT CP\n0 0 .1 .1\n0 .1 .1 .1\n90 0 .1 .1\n", "the J at 90 deg are not those at 0 deg"),
+        ("angle J CT CP\n0 0 .1 .1\n0 .1 .1 .1\n90 0 .1 .1\n", "the J at 90 deg differ from those at 0 deg"),
         ("", "the file is empty"),
     ],
 )

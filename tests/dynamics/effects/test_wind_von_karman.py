@@ -59,5 +59,5 @@ def test_spectra(drone, situation, rotors):
 
 def test_excludes_dryden(drone):
     table = {"wind_speed": 7.0}
-    with pytest.raises(ValueError, match=r"excludes effects\.wind_dryden, both are a turbulence"):
+    with pytest.raises(ValueError, match=r"cannot be combined with effects\.wind_dryden, also a turbulence"):
         effects.from_scene({"wind_von_karman": table, "wind_dryden": table}, drone)
