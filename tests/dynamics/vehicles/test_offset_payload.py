@@ -189,7 +189,7 @@ def test_invalid_scene_payload_is_rejected(overrides, message):
 @pytest.mark.parametrize(
     ("mass", "payload", "table", "message"),
     [
-        ({"payload": 1.0}, {}, {}, "mass.payload: expected 0, got 1 beside a table"),
+        ({"payload": 1.0}, {}, {}, "mass.payload: expected 0, got 1 together with a table"),
         ({}, {"mass": -1.0}, {}, "payload.mass: expected a number above 0 [kg], got -1.0"),
         (
             {},
