@@ -126,7 +126,7 @@ def test_rotor_at_rest_has_no_loads(drone, situation, rotors):
 
 
 def test_axial_inflow_and_small_pitch_are_rejected(drone):
-    with pytest.raises(ConfigError, match=r"both are a flow through the rotors"):
+    with pytest.raises(ConfigError, match=r"also a flow through the rotors"):
         effects.from_scene({"axial_inflow": {}, "dynamic_inflow": {}}, drone)
     flat = drone.model_copy(update={"propeller": drone.propeller.model_copy(update={"pitch": 0.02})})
     with pytest.raises(ConfigError, match=r"effects.dynamic_inflow: the propeller's pitch must be at least"):
