@@ -28,7 +28,7 @@ class Figure(NamedTuple):
         if self.unit == "count" and not float(value).is_integer():
             raise ConfigError(self.name, f"got {value:g}", "a whole number")
         if self.name == "rotors" and value not in ROTORS:
-            raise ConfigError(self.name, f"got {value:g}", "4, 6 or 8; write others into the file by hand")
+            raise ConfigError(self.name, f"got {value:g}", "4, 6 or 8; edit the file for other numbers")
         if not (self.least < value or (self.zero and value == self.least)) or not value < self.most:
             low = f"{'from' if self.zero else 'above'} {self.least:g}"
             high = f" and below {self.most:g}" if self.most < math.inf else ""
@@ -143,7 +143,7 @@ FIGURES = (
         lambda v: 0.05 * v["diameter"] ** 0.5,
         "Throttle step of 10 % about hover with propeller: time to 63 % of the speed change.",
     ),
-    Figure("foot_depth", "m", lambda v: 0.7 * v["arm"], "Height of the centre of mass above the ground, standing."),
+    Figure("foot_depth", "m", lambda v: 0.7 * v["arm"], "Height of the centre of mass above the ground."),
     Figure(
         "foot_distance",
         "m",

@@ -75,7 +75,7 @@ def export_fmu(
         _check(part, cpu)
         _check_fmi(fmi)
         if out.suffix != ".fmu":
-            raise ValueError(f"--out {out}: is no name of an FMU; use a name that ends in .fmu")
+            raise ValueError(f"--out {out}: is not the name of an FMU; use a name that ends in .fmu")
         from lapwing.fmi.fmu import export_fmu
         from lapwing.services.scene_resolver import resolve
 
@@ -105,7 +105,7 @@ def export_ssp(
         _check("vehicle", cpu)
         _check_fmi(fmi)
         if out.suffix != ".ssp":
-            raise ValueError(f"--out {out}: is no name of a package; use a name that ends in .ssp")
+            raise ValueError(f"--out {out}: is not the name of a package; use a name that ends in .ssp")
         from lapwing.fmi.system_package import SSP_VERSIONS, export_system
         from lapwing.services.scene_resolver import resolve
 

@@ -104,7 +104,7 @@ def identify(
     if not keys:
         raise ValueError("--free: missing; name the keys to estimate (airframe.mass.total,...), or use --sensors")
     if len(set(keys)) < len(keys):
-        raise ValueError(f"--free {free}: names a key twice; expected different keys")
+        raise ValueError(f"--free {free}: contains a key twice; expected different keys")
     steps = _horizons(horizons)
     check_distinct({"--out": out, "--json": json})
     claim(out)
@@ -116,7 +116,7 @@ def identify(
         )
     console_output.show(console(), result)
     procedure.write_airframe(out, scene, result, set_ or [])
-    typer.echo(f"{out}: the airframe; its first lines hold what belongs to the scene")
+    typer.echo(f"{out}: the airframe; its first lines contain the values for the scene")
     if json:
         console_output.write_json(json, result)
 

@@ -27,7 +27,7 @@ class ReplayOptions(LinkOptions):
     speed: Speed = "1"
     start: Annotated[float, typer.Option("--from", metavar="S", help="first simulation time to play")] = 0.0
     end: Annotated[float | None, typer.Option("--to", metavar="S", help="last simulation time to play")] = None
-    loop: Annotated[bool, typer.Option("--loop", help="start over at the end")] = False
+    loop: Annotated[bool, typer.Option("--loop", help="restart at the end")] = False
     topics: Annotated[
         str | None, typer.Option(metavar="TOPIC,...", help="play only these topics, e.g. /clock,/drone1/imu")
     ] = None
@@ -43,7 +43,7 @@ class ReplayOptions(LinkOptions):
 
         check_key_prefix(self.key_prefix)
         if self.record and self.loop:
-            raise ValueError("--record and --loop exclude each other; leave out one")
+            raise ValueError("--record and --loop exclude each other; remove one of them")
         if self.record and self.record.resolve() == self.log.resolve():
             raise ValueError(f"--record {self.record}: is the replayed log; choose another file")
         check_log(self.record)

@@ -86,7 +86,7 @@ def check_log(path: Path | None) -> None:
     if path is None:
         return
     if path.exists() and not path.is_file() and not path.is_dir():
-        raise ValueError(f"{path}: is not a regular file; expected the name of a file to write")
+        raise ValueError(f"{path}: is not a regular file; expected the path of an output file")
     _create(path)
     with write_errors(path):
         OutputLock(path).close()
@@ -144,7 +144,7 @@ def check_distinct(paths: dict[str, Path | None]) -> None:
 def _create(path: Path) -> None:
     """Create a file unless it exists; the end of the command removes it if it is still empty."""
     if path.is_dir():
-        raise ValueError(f"{path}: is a folder; expected the name of a file to write")
+        raise ValueError(f"{path}: is a folder; expected the path of an output file")
     is_new = not path.exists()
     with write_errors(path):
         path.open("ab").close()

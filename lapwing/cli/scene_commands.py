@@ -67,7 +67,7 @@ def check(
 
     with foreign_code.permission(allow_code):
         if json and not accuracy:
-            raise ValueError("--json: holds the errors of a flight; give --accuracy, too")
+            raise ValueError("--json: needs the errors of a flight; use it with --accuracy")
         claim(json)
         if scene.suffix == ".mcap":
             if not _accuracy_met(_accuracy_of_log(scene, accuracy, set_ or [], allow_code), json):
@@ -104,7 +104,7 @@ def _accuracy_of_log(log: Path, accuracy: bool, overrides: list[str], allow_code
     from lapwing.studies.accuracy import flight_accuracy
 
     if not accuracy:
-        raise ValueError(f"{log}: is a log; give --accuracy to measure its solver, or use lapwing info")
+        raise ValueError(f"{log}: is a log; use --accuracy to measure its solver, or lapwing info")
     values = with_values({}, overrides)
     limit = values.get("solver", {}).get("accuracy")
     if values not in ({}, {"solver": {"accuracy": limit}}):

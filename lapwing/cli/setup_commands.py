@@ -51,4 +51,4 @@ def certificates(
 
     holders = [*names(), VIEWER]
     make(folder, holders, days)
-    typer.echo(f"{folder}: certificates of {', '.join(holders)}; copy to each host only its own, commit none")
+    typer.echo(f"{folder}: certificates of {', '.join(holders)}; copy to each host only its own; do not commit them")

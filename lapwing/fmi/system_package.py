@@ -101,12 +101,12 @@ def export_system(setup: RunConfig, out: Path, version: int = 3, cpu: str = PORT
 def _check(setup: RunConfig, fmus: Iterable[FmuConfig], version: int) -> None:
     """Raise ValueError if a scene cannot be exported as a package."""
     if setup.modules:
-        raise ValueError(f"{setup.scene}: has Python modules, which a package cannot have; export a scene without them")
+        raise ValueError(f"{setup.scene}: a package cannot contain its Python modules; export a scene without them")
     if not setup.vehicle and any(fmus_of(member.services) for member in members(setup)):
         raise ValueError(f"{setup.scene}: has [services] of several vehicles; export a scene of one vehicle")
     for fmu in fmus:
         if fmu.version > version:
-            raise ValueError(f"services.{fmu.name}: is an FMU of FMI 3.0, which SSP 1.0 does not know; use --fmi 3")
+            raise ValueError(f"services.{fmu.name}: is an FMU of FMI 3.0, which SSP 1.0 does not support; use --fmi 3")
         for element in (*(c.element for c in (*fmu.inputs, *fmu.outputs)), *(each.element for each in fmu.start)):
             if element.size > 1:
                 message = f"services.{fmu.name}: {element.variable} is an element of an array"

@@ -120,9 +120,7 @@ def _status_events(status: TopicView) -> Iterator[Event]:
             before = reason
     if "failed_motor" in fields:
         yield from (
-            Event(time, "fault", f"motor {k} noticed to have failed")
-            for time, k in changes(t, status.failed_motor)
-            if k
+            Event(time, "fault", f"motor {k}: failure detected") for time, k in changes(t, status.failed_motor) if k
         )
     if "battery_warning" in fields:
         for time, level in changes(t, status.battery_warning):

@@ -205,5 +205,5 @@ class ArduPilotLink(ProgramLink):
 
 def _claim(setup: FirmwareSetup) -> socket.socket:
     """Open the port of an instance. Raise FirmwareError if it is in use."""
-    advice = "end the other simulator, or set autopilot.instance"
+    advice = "stop the other simulator, or set autopilot.instance"
     return bound_socket(NAME, setup.host, setup.port_at(PORT, STRIDE), advice)

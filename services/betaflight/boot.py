@@ -70,7 +70,7 @@ def connect(setup: FirmwareSetup, program: Program | None, waits: Waits) -> Msp:
             time.sleep(0.05)
     start_it = f"start betaflight_SITL.elf {setup.host}, or set autopilot.command"
     advice = "check autopilot.command" if program else start_it
-    raise FirmwareError(f"betaflight: nothing listens at {setup.host}:{port} after {setup.start_timeout:g} s; {advice}")
+    raise FirmwareError(f"betaflight: no answer at {setup.host}:{port} after {setup.start_timeout:g} s; {advice}")
 
 
 def settle(

@@ -29,5 +29,5 @@ def check(setup: "RunConfig") -> None:
     names = [f"services.{name.removesuffix(FMU_SUFFIX)}" for name in setup.services if name.endswith(FMU_SUFFIX)]
     if names and not _allowed[0]:
         raise ValueError(
-            f"{', '.join(names)}: an FMU is machine code of its author; if you trust it, use --allow-code to run it"
+            f"{', '.join(names)}: an FMU contains machine code; if you trust its author, use --allow-code to run it"
         )

@@ -202,7 +202,7 @@ def _check_upright(pose: Pose) -> None:
     upward = rotate(pose[1], (0.0, 0.0, 1.0))[2]
     tilt = math.degrees(math.acos(min(upward, 1.0)))
     if tilt > STEEPEST_START:
-        message = f"no room for the vehicle at its start: on its feet it would tilt by {tilt:.0f} degrees"
+        message = f"the ground at the start is too uneven: the vehicle would tilt by {tilt:.0f} degrees"
         raise ConfigError("environment.terrain", message, "flatter ground at the start")
 
 
@@ -215,7 +215,7 @@ def _check_above_ground(frame: Airframe, terrain: Relief, pose: Pose) -> None:
         depth = surface(terrain, x + dx, y + dy)[0] - (z + dz)
         if depth > MAX_PENETRATION:
             point = ", ".join(f"{p:g}" for p in part)
-            message = f"buries the start: the vehicle's point ({point}) m would be {depth:.2f} m below the ground"
+            message = f"intersects the vehicle at the start: point ({point}) m would be {depth:.2f} m below the ground"
             raise ConfigError("environment.terrain", message, "free ground at the start")
 
 

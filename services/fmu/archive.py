@@ -66,7 +66,7 @@ def _check_files(key: str, path: Path, archive: zipfile.ZipFile) -> None:
     if DESCRIPTION not in names:
         raise ConfigError(key, f"{path}: has no file {DESCRIPTION}", "an FMU")
     if outside := [name for name in names if re.search(r"^/|^\w:|\\|(^|/)\.\.(/|$)", name)]:
-        raise ConfigError(key, f"{path}: file {outside[0]!r} leads out of the FMU", "relative paths without ..")
+        raise ConfigError(key, f"{path}: file {outside[0]!r} is outside the FMU", "relative paths without ..")
     size = 0
     for file in files:
         size += file.file_size
@@ -75,7 +75,7 @@ def _check_files(key: str, path: Path, archive: zipfile.ZipFile) -> None:
     if archive.getinfo(DESCRIPTION).file_size > LARGEST_DESCRIPTION:
         raise ConfigError(key, f"{path}: {DESCRIPTION} is too large", f"at most {LARGEST_DESCRIPTION / 1e6:g} MB")
     if damaged := archive.testzip():
-        raise ConfigError(key, f"{path}: file {damaged} is damaged", "a whole FMU")
+        raise ConfigError(key, f"{path}: file {damaged} is damaged", "a complete FMU")
 
 
 def _version(key: str, path: Path, text: bytes) -> int:
@@ -84,7 +84,7 @@ def _version(key: str, path: Path, text: bytes) -> int:
         raise ConfigError(key, f"{path}: {DESCRIPTION} declares a document type", "XML without entities")
     version = re.search(rb"<fmiModelDescription\b[^>]*\bfmiVersion\s*=\s*[\"']([\w.-]*)", text)
     if version is None:
-        raise ConfigError(key, f"{path}: {DESCRIPTION} describes no model", "an FMU")
+        raise ConfigError(key, f"{path}: {DESCRIPTION} does not describe a model", "an FMU")
     if version[1][:2] not in (b"2.", b"3."):
         raise ConfigError(key, f"{path}: FMI {version[1].decode()}", "an FMU of version 2.0 or 3.0")
     return int(version[1][:1])
@@ -119,4 +119,4 @@ def _check_library(key: str, path: Path, archive: zipfile.ZipFile, version: int,
         raise ConfigError(key, f"{path}: has no file {name}", "the library that modelIdentifier names")
     library = archive.read(name)
     if not library.startswith(b"\x7fELF") or library[_MACHINE] != _X86_64:
-        raise ConfigError(key, f"{path}: {name} is no library for x86-64", "an FMU for Linux on x86-64")
+        raise ConfigError(key, f"{path}: {name} is not a library for x86-64", "an FMU for Linux on x86-64")

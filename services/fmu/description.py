@@ -169,7 +169,7 @@ def content_of(key: str, path: Path, embedded: str | None) -> bytes:
     except ConfigError:
         raise
     except ValueError:
-        raise ConfigError(key, "the embedded FMU is damaged", "a whole log, or the scene") from None
+        raise ConfigError(key, "the embedded FMU is damaged", "a complete log, or the scene") from None
     except OSError as error:
         raise ConfigError(key, f"{path}: {(error.strerror or 'cannot be read').lower()}", "an FMU") from None
 

@@ -52,7 +52,7 @@ def _check_outputs(fmus: list[FmuConfig], published: Mapping[str, Port]) -> None
     for fmu in fmus:
         key = f"services.{fmu.name}.outputs"
         if not fmu.outputs:
-            raise ConfigError(key, "nothing reads an output of the FMU", 'a table of "PORT.COLUMN" = "VARIABLE"')
+            raise ConfigError(key, "no service reads an output of the FMU", 'a table of "PORT.COLUMN" = "VARIABLE"')
         for port in dict.fromkeys(each.port for each in fmu.outputs):
             if owners.setdefault(port, fmu.name) != fmu.name:
                 raise ConfigError(key, f"two FMUs compute columns of {port}", "one FMU for each port")

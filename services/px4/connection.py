@@ -38,7 +38,7 @@ class Connection:
         except OSError as error:
             self._server.close()
             message = f"px4: cannot listen on {self.where} ({error.strerror})"
-            raise FirmwareError(f"{message}; end the other simulator, or set autopilot.instance") from None
+            raise FirmwareError(f"{message}; stop the other simulator, or set autopilot.instance") from None
         self._peer: socket.socket | None = None
         self._parser, self.memory = FrameParser(RECEIVED), memory
         self.extra_connections = self._rejected = 0
@@ -166,4 +166,4 @@ def claim(setup: FirmwareSetup, memory: Stream) -> tuple[Connection, UdpTranspor
     except OSError as error:
         connection.close()
         message = f"px4: cannot listen on udp {setup.host}:{port} ({error.strerror})"
-        raise FirmwareError(f"{message}; end the other program, or set autopilot.instance") from None
+        raise FirmwareError(f"{message}; stop the other program, or set autopilot.instance") from None

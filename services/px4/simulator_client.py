@@ -49,7 +49,7 @@ class SimulatorClient:
                 self._socket = socket.create_connection(self._address, timeout=WAIT)
             except OSError:
                 if patience.over:
-                    message = f"simulator: nothing listens on {self.where} for {timeout:g} s"
+                    message = f"simulator: no answer on {self.where} for {timeout:g} s"
                     raise FirmwareError(f"{message}; start it, or check --px4-sim") from None
                 time.sleep(0.05)
         self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)

@@ -37,7 +37,7 @@ def play(
         listen: endpoint that subscribers connect to.
         cut: part of the log to play.
         speed: simulated seconds per second; None for as fast as possible.
-        loop: True to start over at the end.
+        loop: True to restart at the end.
         record: log to write the published messages to.
         stopping: returns True to stop.
         listener: called with each message, for consumers that do not subscribe.

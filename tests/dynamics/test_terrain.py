@@ -129,7 +129,7 @@ def test_empty_terrain_is_level_ground():
         ({"grid": np.zeros((5, 1))}, "grid.heights: expected at least 2 rows and 2 columns"),
         (
             {"grid": np.zeros((3, 3)), "corner": (1.0, 0.0)},
-            "grid.corner: the grid does not hold home: it",
+            "grid.corner: the grid does not contain home: it",
         ),
         ({"steps": [(2.0, 0.1), (1.0, 0.1)]}, "steps.distance: expected growing distances above 0 m, got [2.0, 1.0]"),
     ],

@@ -151,7 +151,7 @@ def test_export_needs_permission_for_fmus(folder: Path, command: str) -> None:
     out = folder / {"export-ssp": "x.ssp", "export-fmu": "x.fmu", "export-library": "x"}[command]
     done = run_command(command, str(folder / "scene.toml"), "--out", str(out), *OPTIONS)
     assert done.returncode == 2
-    assert "an FMU is machine code of its author; if you trust it, use --allow-code to run it" in done.stderr
+    assert "an FMU contains machine code; if you trust its author, use --allow-code to run it" in done.stderr
     assert done.stderr.count("\n") == 1
     assert not out.is_file()
 
@@ -173,7 +173,7 @@ def test_fmus_that_package_cannot_have_are_named(tmp_path: Path) -> None:
     scene = tmp_path / "ball.toml"
     scene.write_text(HOVER.read_text() + ball)
     for fmi, message in (
-        ("2", "is an FMU of FMI 3.0, which SSP 1.0 does not know; use --fmi 3"),
+        ("2", "is an FMU of FMI 3.0, which SSP 1.0 does not support; use --fmi 3"),
         ("3", "u[0] is an element"),
     ):
         done = run_command("export-ssp", str(scene), "--allow-code", "--fmi", fmi, "--out", str(tmp_path / "a.ssp"))

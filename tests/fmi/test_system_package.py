@@ -88,7 +88,7 @@ def test_fmu_in_package_takes_place_of_part(folder: Path, fmi: int) -> None:
     log = folder / f"foreign{fmi}.mcap"
     done = run_command("run", str(package), "--log", str(log), "--mode", "single-process")
     assert done.returncode == 2
-    assert "services.autopilot: an FMU is machine code of its author" in done.stderr
+    assert "services.autopilot: an FMU contains machine code" in done.stderr
     ports = 'services.autopilot.outputs={"actuators.armed"="actuators.armed"}'
     done = run_command(
         "run", str(package), "--log", str(log), "--allow-code", "--mode", "single-process", "--set", ports
@@ -131,7 +131,7 @@ def test_system_in_system_flies_like_flat_one(folder: Path, tmp_path: Path) -> N
     package, log = nested(flat, tmp_path / "nested.ssp"), tmp_path / "nested.mcap"
     done = run_command("run", str(package), "--log", str(log), *HOVER)
     assert done.returncode == 2
-    assert "services.control_pilot: an FMU is machine code of its author" in done.stderr
+    assert "services.control_pilot: an FMU contains machine code" in done.stderr
     ports = 'services.control_pilot.outputs={"actuators.armed"="actuators.armed"}'
     done = run_command("run", str(package), "--allow-code", "--log", str(log), *HOVER, "--set", ports)
     assert done.returncode == 0, done.stderr

@@ -289,7 +289,7 @@ def test_unchanged_types_of_other_version_are_replayed(lapwing, old):
         (["info", "text.mcap"], "text.mcap: not an MCAP file"),
         (["verify", "whole.mcap", "whole.mcap"], "is the same file as FILE"),
         (["verify", "foreign.mcap"], "has no digest"),
-        (["recover", "whole.mcap"], "there is nothing to recover"),
+        (["recover", "whole.mcap"], "no recovery is needed"),
         (["recover", "cut.mcap", "--out", "none/a.mcap"], "none/a.mcap: cannot be written"),
         (["export", "whole.mcap"], "expected --parquet FOLDER, --csv FOLDER or --mat FILE"),
         (["export", "whole.mcap", "--csv", "csv", "--topics", "/x"], "the log has no topic /x; it has /clock"),

@@ -123,7 +123,7 @@ def test_template_errors_are_one_line(scene, tmp_path):
         scene(f"effects.other.module={NAME}")
     with pytest.raises(ConfigError, match=r"effects.other.module: no module nobody_has_this"):
         scene("effects.other.module=nobody_has_this")
-    with pytest.raises(ConfigError, match=r"effects.gravity.module: gravity is the name of an effect that ships"):
+    with pytest.raises(ConfigError, match=r"effects.gravity.module: gravity is the name of a shipped effect"):
         scene(f"effects.gravity.module={NAME}")
     (tmp_path / f"{NAME}.py").write_text("1 +")
     with pytest.raises(ConfigError, match=r"effects.tether_drag.module: tether_drag.py, line 1: invalid syntax"):

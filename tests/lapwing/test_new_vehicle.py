@@ -81,7 +81,7 @@ def test_invalid_terminal_input_is_prompted_again(tmp_path):
     assert "mass: expected a number in kg alone, as 2, got '1,5 kg'" in output
     assert "mass = 1500 kg, where about 2 is usual: is that the unit? [y/N]" in output
     assert "mass: expected a number above 0 and below 10000, in kg, got -1" in output
-    assert "rotors: expected 4, 6 or 8; write others into the file by hand, got 5" in output
+    assert "rotors: expected 4, 6 or 8; edit the file for other numbers, got 5" in output
     assert "rotors: expected a whole number, got 4.5" in output
     text = (tmp_path / "vehicles/mine.toml").read_text()
     assert "total = 1.5 " in text
@@ -129,7 +129,7 @@ def test_figure_far_from_its_guess_is_warned_of(tmp_path):
             r"0\.6 A without load, with 36 V .* A and 14\.8 V; resistance = 60 ohm",
         ),
         ({"stand_thrust": 50.0, "stand_torque": 1.0}, r"50 N at .* rad/s is more than the .* N that a propeller"),
-        ({"stand_torque": 1e-4}, r"0.0001 N m at .* rad/s is less than the .* N m that this thrust costs"),
+        ({"stand_torque": 1e-4}, r"0.0001 N m at .* rad/s is less than the .* N m that this thrust needs"),
     ],
 )
 def test_invalid_figure_is_rejected_without_output_file(tmp_path, figures, message):

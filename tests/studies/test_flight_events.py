@@ -57,7 +57,7 @@ def test_events_are_listed_in_order():
         (2.0, "phase", "hover"),
         (2.0, "motors", "motors 1, 3 at 40 V for 0.20 s, 6.7 % of the time in the air"),
         (2.5, "fault", "rotor 2 keeps 30 % of its thrust"),
-        (2.8, "fault", "motor 2 noticed to have failed"),
+        (2.8, "fault", "motor 2: failure detected"),
         (3.0, "failsafe", "a motor has failed"),
         (3.0, "mode", "land"),
         (3.5, "battery", "low"),

@@ -117,7 +117,7 @@ def test_card_and_autopilot_use_active_rotor_model(tmp_path, tables):
     power = 4.0 * current * (motor.rotor_constant * speed + motor.resistance * current)
     energy = performance.battery_energy(load_airframe(VEHICLE))
     assert rows["hover time"].computed == pytest.approx(energy / power / 60.0)
-    assert rows["ceiling"].reason == "[effects.rotor_quadratic] knows no density of the air"
+    assert rows["ceiling"].reason == "[effects.rotor_quadratic] has no air density"
 
 
 def test_airframe_without_rotor_model_is_rejected(tmp_path):

@@ -52,7 +52,7 @@ def find(key: str, name: str, folder: Path) -> dict[str, Path]:
     elif installed is None:
         raise ConfigError(key, f"no module {name}", f"{file}, or a module on Python's path")
     elif not (installed.origin or "").endswith(".py"):
-        raise ConfigError(key, f"module {name} has no source", "one written in Python")
+        raise ConfigError(key, f"module {name} has no source", "a module written in Python")
     else:
         file = Path(str(installed.origin)).resolve()
     result = {name: file}

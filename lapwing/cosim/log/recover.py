@@ -26,7 +26,7 @@ def recover(path: Path, out: Path) -> RecoveryResult:
     """
     with LogReader(path, skip_damaged=True) as log:
         if log.complete and not log.damaged:
-            raise ValueError(f"{path}: is complete and undamaged; there is nothing to recover")
+            raise ValueError(f"{path}: is complete and undamaged; no recovery is needed")
         log.check_versions()
         defects = "; ".join([*log.damaged, *([] if log.complete else ["it has no end"])])
         metadata = {key: value for key, value in log.metadata.items() if key != "digest"}

@@ -52,7 +52,7 @@ def get(name: str, module: str | None = None) -> ModuleType:
     """
     if module is not None:
         if name in names():
-            raise ConfigError(f"effects.{name}.module", f"{name} is the name of an effect that ships", "another name")
+            raise ConfigError(f"effects.{name}.module", f"{name} is the name of a shipped effect", "another name")
         return importlib.import_module(module)
     if name not in names():
         error = ConfigError.unknown(f"effects.{name}", "effect", name, names())
@@ -71,7 +71,7 @@ def parameter_class(name: str, module: str | None = None) -> type:
     defining, expected = get(name, module), class_name(name)
     if not hasattr(defining, expected):
         raise ConfigError(
-            f"effects.{name}.module", f"{module} has no class {expected}", "the effect's parameters there"
+            f"effects.{name}.module", f"{module} has no class {expected}", "a class with the effect's parameters"
         )
     return getattr(defining, expected)
 

@@ -56,10 +56,10 @@ def check_start(p: Any, x0: Any) -> None:
                 raise ValueError(f"{_system(p)}: {what} {name} = {value}: must be finite")
     for name, result in _leaves(x0):
         if type(result) is Rotation and determinant(result) < 0.0:
-            raise ValueError(f"{_system(p)}: initial {name} is no rotation: determinant {determinant(result):.3g}")
-        no = "no rotation, " if type(result) in (Quaternion, Rotation) else ""
+            raise ValueError(f"{_system(p)}: initial {name} is not a rotation: determinant {determinant(result):.3g}")
+        no = "not a rotation, " if type(result) in (Quaternion, Rotation) else ""
         if not np.isfinite(flatten(normalise(result))).all():
-            raise ValueError(f"{_system(p)}: initial {name} is {no or 'no direction, '}all zero")
+            raise ValueError(f"{_system(p)}: initial {name} is {no or 'not a direction, '}all zero")
         defect = max(abs(a - b) for a, b in zip(flatten(result), flatten(normalise(result)), strict=True))
         if not defect <= UNIT_DEFECT:
             raise ValueError(f"{_system(p)}: initial {name} is {no}off its manifold by {defect:.3g}: normalise it")

@@ -218,7 +218,7 @@ def as_float_arrays(
     for name, array in (("configuration", configuration), ("velocity", velocity), ("wrench", wrench), ("drive", drive)):
         if not np.all(np.isfinite(array)):
             raise ValueError(
-                f"{name} holds a number that is not finite in row {int(np.argwhere(~np.isfinite(array))[0, 0])}"
+                f"{name} contains a number that is not finite in row {int(np.argwhere(~np.isfinite(array))[0, 0])}"
             )
     return configuration, velocity, wrench, drive
 

@@ -105,7 +105,7 @@ def delivery_drone(
         raise ValueError(f"unknown drive {driven!r}: choose one of torque, speed")
     signs = list(zip(rotor_sign_x, rotor_sign_y, strict=True))
     if len(signs) != 4 or any(abs(s) != 1 for pair in signs for s in pair):
-        raise ValueError(f"rotor_sign_x and rotor_sign_y must hold +1 or -1 for four rotors, not {signs}")
+        raise ValueError(f"rotor_sign_x and rotor_sign_y must contain +1 or -1 for four rotors, not {signs}")
     side = arm_length / math.sqrt(2.0)
     ix, iy, iz = (float(v) for v in frame_inertia)
     bx, by, bz = (float(v) for v in propeller_inertia)

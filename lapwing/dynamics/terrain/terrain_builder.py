@@ -77,7 +77,7 @@ def _validate_grid(grid: np.ndarray, corner: tuple[float, float], spacing: float
     if not (0.0 <= -corner[0] <= (columns - 1) * spacing and 0.0 <= -corner[1] <= (rows - 1) * spacing):
         x, y = corner[0] + (columns - 1) * spacing, corner[1] + (rows - 1) * spacing
         reach = f"it reaches from ({corner[0]:g}, {corner[1]:g}) to ({x:g}, {y:g}) m"
-        raise ConfigError("grid.corner", f"the grid does not hold home: {reach}", "(0, 0) within it")
+        raise ConfigError("grid.corner", f"the grid does not contain home: {reach}", "(0, 0) within it")
     rise = max(abs(np.diff(heights, axis=axis)).max() for axis in (0, 1)) / spacing
     if rise > STEEPEST:
         message = f"ground steeper than 45 degrees, tangent {rise:.2f}"

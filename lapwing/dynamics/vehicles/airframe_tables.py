@@ -41,7 +41,7 @@ class Mass(Section):
         a, b, c = principal_moments(self.inertia, self.products)
         if a <= 0.0:
             raise ConfigError(
-                "products", f"got {list(self.products)}", "smaller ones: a principal moment is not above 0"
+                "products", f"got {list(self.products)}", "smaller values: a principal moment is not above 0"
             )
         if a + b < c:
             raise ConfigError(

@@ -38,13 +38,13 @@ def drone_of(airframe: "Airframe", drive: str = "torque") -> Drone:
     """
     rotors = airframe.rotors
     if len(rotors.position) != 4 or rotors.mass is None or rotors.blade_inertia is None:
-        raise ValueError("rotors: the five bodies need four rotors with mass and blade_inertia")
+        raise ValueError("rotors: the five-body model needs four rotors with mass and blade_inertia")
     if airframe.payload:
-        raise ValueError("payload: the five bodies have no place for one; leave the table out")
+        raise ValueError("payload: the five-body model does not support it; remove the table")
     if rotors.tilted_axis:
-        raise ValueError("rotors.axis: the five bodies need rotors that push along body z")
+        raise ValueError("rotors.axis: the five-body model needs rotors that push along body z")
     if any(airframe.mass.products):
-        raise ValueError("mass.products: the five bodies need principal axes, and products of 0")
+        raise ValueError("mass.products: the five-body model needs principal axes, and products of 0")
     spins = 1.0 if drive == "torque" else 0.0
     mass = airframe.mass.total - 4.0 * rotors.mass
     blade = (*rotors.blade_inertia, rotors.inertia)

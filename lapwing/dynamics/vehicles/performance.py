@@ -78,7 +78,7 @@ def rotor_of(airframe: Airframe) -> Rotor:
     """
     propeller, square = airframe.propeller, (2.0 * math.pi) ** 2
     if propeller is None:
-        raise ValueError("the vehicle has no [propeller]; give a scene with [effects.rotor_quadratic] instead")
+        raise ValueError("the vehicle has no [propeller]; use a scene with [effects.rotor_quadratic]")
     return Rotor(
         thrust_coefficient(propeller) * propeller.diameter**4 / square,
         torque_coefficient(propeller) * propeller.diameter**5 / square,
@@ -214,7 +214,7 @@ def ceiling(airframe: Airframe, air: Atmosphere = STANDARD.atmosphere, rotor: Ro
         ValueError: the thrust does not depend on the density.
     """
     if rotor is not None and not rotor.with_density:
-        raise ValueError("[effects.rotor_quadratic] knows no density of the air")
+        raise ValueError("[effects.rotor_quadratic] has no air density")
     weight = airframe.mass.total * GRAVITY
 
     def excess(altitude: float) -> float:

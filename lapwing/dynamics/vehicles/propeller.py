@@ -55,12 +55,12 @@ def from_stand(
         most = thrust / lift_correction
         raise ValueError(
             f"{thrust:g} N at {speed:g} rad/s is more than the {most:.3g} N that a propeller of this geometry can "
-            "give; expected a higher speed, or a downwash_factor nearer 1"
+            "produce; expected a higher speed, or a downwash_factor nearer 1"
         )
     if zero_lift_drag < 0.0:
         least = torque * drag_coefficients(propeller)[1] / drag
         raise ValueError(
-            f"{torque:g} N m at {speed:g} rad/s is less than the {least:.3g} N m that this thrust costs; "
+            f"{torque:g} N m at {speed:g} rad/s is less than the {least:.3g} N m that this thrust needs; "
             "expected a larger torque, or less thrust"
         )
     return lift_correction, zero_lift_drag

@@ -91,7 +91,7 @@ def show(console: Console, comparison: Comparison) -> None:
     """Print the comparison."""
     unpaired = f", {comparison.unpaired} runs without a pair left out" if comparison.unpaired else ""
     console.print(f"{comparison.pairs} pairs of runs{unpaired}")
-    console.print(f"different: {', '.join(comparison.differing) or 'nothing'}")
+    console.print(f"differences: {', '.join(comparison.differing) or 'none'}")
     for name, p in zip(comparison.names, comparison.failures, strict=True):
         console.print(f"  {name}: failures {p.value:.2%}, 95 % interval {p.low:.2%} to {p.high:.2%}")
     console.print(f"  failed in the first only: {comparison.only_first}, in the second only: {comparison.only_second}")

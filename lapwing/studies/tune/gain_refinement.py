@@ -89,7 +89,7 @@ def refine(
             (f["outcome_text"] for f in before if f["outcome"] != "landed"),
             "no gain set nearby has the margins and lands",
         )
-        raise ValueError(f"no gain set lands this flight; as designed: {reason}; use other bandwidths")
+        raise ValueError(f"no gain set completes this flight; designed gains: {reason}; use other bandwidths")
     bandwidths, gains, after = valid[min(valid)]
     return Refinement(gains, bandwidths, before, after, len(valid))
 

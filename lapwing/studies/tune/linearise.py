@@ -63,7 +63,7 @@ def hover(scene: Scene) -> Hover:
     guess = 0.7 * top / frame.motor.rotor_constant, 0.7 * top
     (speed, voltage), _, solved, _ = fsolve(unbalance, guess, full_output=True)
     if solved != 1 or not 0.0 < voltage < top:
-        raise ValueError(f"{scene.path}: no hover found within {top:g} V; expected a vehicle that carries its weight")
+        raise ValueError(f"{scene.path}: no hover found within {top:g} V; expected a vehicle that can hover")
 
     rotors, volts = speed * evenly, voltage * evenly
     d = STEP * speed

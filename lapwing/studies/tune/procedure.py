@@ -102,7 +102,7 @@ def tune(
         setup = corners.with_gains(campaign_setup(scene), gains)
         corner_flights = {c: corners.metrics_of(corners.with_vehicle(setup, scene, c)) for c in corners.CORNERS}
     else:
-        warn("gains are not refined: the autopilot of the scene follows no [trajectory]")
+        warn("gains are not refined: the autopilot of the scene does not follow a [trajectory]")
     after = _review("new", build(gains.plain(), airframe), plant, tick)
     return Tuning(
         scene.name, tick, compiled_model, identification, plant, before, after, gains, refinement, corner_flights

@@ -102,7 +102,7 @@ def _put(
     if m.type_mask & FORCE:
         _reject(session, f"{m.get_type()}: forces unsupported")
     elif all(map(math.isnan, values)):
-        _reject(session, f"{m.get_type()}: nothing to follow")
+        _reject(session, f"{m.get_type()}: contains no setpoint")
     elif session.vehicle.firmware.GUIDED and all(map(math.isnan, (*values[3:9], rate))):
         if _follows_setpoint(session, m):  # ArduPilot flies to a position that is sent once
             _send(session, m, "goto", (*position_world, yaw))
@@ -121,7 +121,7 @@ def attitude_target(session: Session, m: Any) -> None:
     unit = (math.nan,) * 4 if ignored else swap_attitude(tuple(e / norm for e in m.q))  # type: ignore[arg-type]
     rates = apply_mask(m.type_mask, 0, m.body_roll_rate, m.body_pitch_rate, m.body_yaw_rate)
     if ignored and all(map(math.isnan, rates)):
-        _reject(session, "SET_ATTITUDE_TARGET: nothing to follow")
+        _reject(session, "SET_ATTITUDE_TARGET: contains no setpoint")
         return
     thrust, climb_rate = _unless(m.type_mask & mavlink.ATTITUDE_TARGET_TYPEMASK_THROTTLE_IGNORE, m.thrust), 0.0
     if m.type_mask & THRUST_BODY:

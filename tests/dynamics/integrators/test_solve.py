@@ -91,9 +91,9 @@ def test_invalid_steps_are_rejected(step):
 
 
 def test_invalid_start_tolerance_and_times_are_rejected():
-    with pytest.raises(ValueError, match=r"initial attitude is no rotation, off its manifold by 1: norm"):
+    with pytest.raises(ValueError, match=r"initial attitude is not a rotation, off its manifold by 1: norm"):
         simulate(get("rk4"), TOP, RigidBody(Quaternion(2.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), 0.1, 10)
-    with pytest.raises(ValueError, match=r"FreeBody: initial attitude is no rotation, all zero"):
+    with pytest.raises(ValueError, match=r"FreeBody: initial attitude is not a rotation, all zero"):
         simulate(get("rk4"), TOP, RigidBody(Quaternion(0.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0)), 0.1, 10)
     with pytest.raises(ValueError, match=r"tolerance 1e-20 cannot be met: at least 1e-14"):
         solve(TOP, START, np.array([0.0, 1.0]), 1e-20)

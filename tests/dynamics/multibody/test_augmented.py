@@ -145,7 +145,7 @@ def test_contradicting_drives_are_reported():
     [
         (lambda q, v, w: (q[:4], v, w), r"configuration must have shape \(5, 6\) or \(5, 7\)"),
         (lambda q, v, w: (q, v[:, :3], w), r"velocity must have shape \(5, 6\)"),
-        (lambda q, v, w: (q, v * np.nan, w), "velocity holds a number that is not finite in row 0"),
+        (lambda q, v, w: (q, v * np.nan, w), "velocity contains a number that is not finite in row 0"),
     ],
 )
 def test_invalid_arguments_are_rejected(change, message):

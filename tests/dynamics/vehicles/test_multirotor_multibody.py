@@ -117,5 +117,5 @@ def test_hinges_carry_thrust_and_drives_hold_drag(drive):
 
 def test_single_rotor_must_be_described():
     bare = DRONE.model_copy(update={"rotors": DRONE.rotors.model_copy(update={"mass": None})})
-    with pytest.raises(ValueError, match="rotors: the five bodies need four rotors with mass and blade_inertia"):
+    with pytest.raises(ValueError, match="rotors: the five-body model needs four rotors with mass and blade_inertia"):
         multirotor_multibody.parameters(bare)

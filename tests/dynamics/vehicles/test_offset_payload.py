@@ -177,7 +177,7 @@ def test_batch_release_is_bit_for_bit_identical():
     ("overrides", "message"),
     [
         ({"vehicle.mass": 9.0}, r"vehicle\.mass: conflicts with airframe\.payload"),
-        ({"vehicle.model": "multibody"}, "payload: the five bodies have no place for one"),
+        ({"vehicle.model": "multibody"}, "payload: the five-body model does not support it"),
     ],
 )
 def test_invalid_scene_payload_is_rejected(overrides, message):

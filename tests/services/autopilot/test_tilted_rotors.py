@@ -62,7 +62,7 @@ def test_spin_up_reaction_is_that_of_plant():
         ("rigid_body", [[0.0, 3.0, 1.0]] * 4, "maximum thrust"),  # tilted by 72 degrees to the side: cannot hover
         ("rigid_body", [[0.0, 0.0, 0.0]] * 4, r"airframe.rotors.axis.0: expected a direction that points up"),
         ("rigid_body", [[0.0, 0.0, -1.0]] * 4, r"airframe.rotors.axis.0: expected a direction that points up"),
-        ("multibody", [[0.1, 0.0, 1.0]] * 4, "rotors.axis: the five bodies need rotors that push along body z"),
+        ("multibody", [[0.1, 0.0, 1.0]] * 4, "rotors.axis: the five-body model needs rotors that push along body z"),
     ],
 )
 def test_unflyable_rotor_axes_are_rejected(model, axis, message):

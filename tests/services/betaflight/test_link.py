@@ -111,7 +111,7 @@ def test_stall_ends_run_and_is_reported(tmp_path):
 
 def test_absent_firmware_is_reported(tmp_path):
     first = free_ports()
-    with pytest.raises(FirmwareError, match=rf"nothing listens at 127.0.0.1:{first + 3} after 0.3 s; start betaflight"):
+    with pytest.raises(FirmwareError, match=rf"no answer at 127.0.0.1:{first + 3} after 0.3 s; start betaflight"):
         fly_single(setup(first, start_timeout=0.3), tmp_path / "flight.mcap")
 
 
@@ -126,7 +126,7 @@ def test_used_port_is_reported(tmp_path):
     first = free_ports()
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", first))
-        with pytest.raises(FirmwareError, match=rf"cannot listen on udp 127.0.0.1:{first} .*end the other"):
+        with pytest.raises(FirmwareError, match=rf"cannot listen on udp 127.0.0.1:{first} .*stop the other"):
             fly_single(setup(first), tmp_path / "flight.mcap")
 
 

@@ -17,7 +17,7 @@ pytestmark = pytest.mark.long
 TIMEOUT = 1800  # [s]
 SLOW_START = (
     "cannot be armed after",
-    "nothing listens at",
+    "no answer at",
     "no answer to",
     "does not restart within",
     "cannot open TCP",

@@ -116,7 +116,7 @@ def test_invalid_environment_is_rejected(table, message):
 def test_start_inside_obstacle_is_rejected():
     pillar = {"environment.terrain.cylinder": [{"position": [0.0, 0.0], "radius": 0.1, "top": 0.6}]}
     with pytest.raises(
-        SceneError, match=r"environment.terrain: buries the start: the vehicle's point \(0, 0, 0\) m would be"
+        SceneError, match=r"environment.terrain: intersects the vehicle at the start: point \(0, 0, 0\) m would be"
     ):
         resolve(load("hover", pillar))
 
@@ -129,7 +129,7 @@ def test_start_inside_obstacle_is_rejected():
     ],
 )
 def test_start_on_wall_is_rejected(terrain):
-    with pytest.raises(SceneError, match=r"environment.terrain: no room .* it would tilt by 8\d degrees"):
+    with pytest.raises(SceneError, match=r"environment.terrain: the ground at the start .* would tilt by 8\d degrees"):
         resolve(load("hover", {"environment.terrain": terrain}))
 
 

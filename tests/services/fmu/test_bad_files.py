@@ -68,17 +68,17 @@ def assert_rejected(folder: Path, message: str) -> None:
     [
         (without(XML), "has no file modelDescription.xml; expected an FMU"),
         (without(LIBRARY), "has binaries for no platform; expected an FMU for Linux on x86-64"),
-        (with_file(LIBRARY, on_arm), f"{LIBRARY} is no library for x86-64"),
-        (with_file(LIBRARY, lambda _: b""), f"{LIBRARY} is no library for x86-64"),
+        (with_file(LIBRARY, on_arm), f"{LIBRARY} is not a library for x86-64"),
+        (with_file(LIBRARY, lambda _: b""), f"{LIBRARY} is not a library for x86-64"),
         (replaced('Identifier="small"', 'Identifier="big"'), "has no file binaries/linux64/big.so"),
         (replaced('Identifier="small"', 'Identifier="../../a"'), "modelIdentifier '../../a'; expected letters"),
         (replaced("<fmiModel", f"{BOMB}<fmiModel"), "declares a document type; expected XML without entities"),
         (replaced('fmiVersion="2.0"', 'fmiVersion="1.0"'), "FMI 1.0; expected an FMU of version 2.0 or 3.0"),
-        (replaced("fmiModelDescription", "model"), "modelDescription.xml describes no model"),
+        (replaced("fmiModelDescription", "model"), "modelDescription.xml does not describe a model"),
         (replaced("</ScalarVariable>", ""), "not an FMU: Opening and ending tag mismatch"),
-        (with_file("../evil.so", lambda _: b"x"), "file '../evil.so' leads out of the FMU"),
-        (with_file("/tmp/evil.so", lambda _: b"x"), "file '/tmp/evil.so' leads out of the FMU"),
-        (with_file("resources\\a", lambda _: b"x"), "leads out of the FMU"),
+        (with_file("../evil.so", lambda _: b"x"), "file '../evil.so' is outside the FMU"),
+        (with_file("/tmp/evil.so", lambda _: b"x"), "file '/tmp/evil.so' is outside the FMU"),
+        (with_file("resources\\a", lambda _: b"x"), "is outside the FMU"),
     ],
 )
 def test_hostile_file_is_one_line(tmp_path: Path, files: Files, change: Callable[[Files], Files], message: str) -> None:
@@ -117,6 +117,6 @@ def test_damaged_member_is_one_line(tmp_path: Path, files: Files) -> None:
         content = bytearray(whole)
         content[place] ^= 0xFF
         path.write_bytes(content)
-        assert_rejected(tmp_path, f"file {name} is damaged; expected a whole FMU")
+        assert_rejected(tmp_path, f"file {name} is damaged; expected a complete FMU")
     path.write_bytes(content[: len(content) // 2])
     assert_rejected(tmp_path, "not an FMU: File is not a zip file")

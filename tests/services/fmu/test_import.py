@@ -175,7 +175,7 @@ def test_timeout_longer_than_stall_is_named_in_multi_process_mode(folder: Path) 
 def test_fmu_without_allow_code_is_rejected(folder: Path) -> None:
     done = run_command("run", str(scene_with(folder)), "--mode", "single-process", "--log", str(folder / "x.mcap"))
     assert done.returncode == 2
-    assert done.stderr.startswith("lapwing: services.motor: an FMU is machine code of its author")
+    assert done.stderr.startswith("lapwing: services.motor: an FMU contains machine code")
     assert done.stderr.count("\n") == 1
 
 

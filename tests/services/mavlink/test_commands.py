@@ -230,7 +230,7 @@ def test_body_rates_and_thrusts_of_either_kind():
     station.send("set_attitude_target", 0, 1, 1, 0b1000_0111, level, 0.0, 0.0, 0.0, 0.5)
     bench.step()
     assert [m.text for m in station.all("STATUSTEXT")] == [
-        "SET_ATTITUDE_TARGET: thrust_body unsupported", "SET_ATTITUDE_TARGET: nothing to follow",
+        "SET_ATTITUDE_TARGET: thrust_body unsupported", "SET_ATTITUDE_TARGET: contains no setpoint",
     ]  # fmt: skip
 
 

@@ -117,7 +117,7 @@ WRONG = {
     "no rotation": (
         SATELLITE,
         "gyrostat.initial_attitude=[1.0, 0.1, 0.0, 0.0]",
-        "attitude is no rotation, off its manifold by 0.00",
+        "attitude is not a rotation, off its manifold by 0.00",
     ),
     "no inertia": (SATELLITE, "gyrostat.inertia=[500.0, 0.0, 1000.0]", "above 0, got 0 about y"),
     "not for this state": (

@@ -205,7 +205,7 @@ def test_absent_simulator_is_reported(tmp_path):
             "--set", "autopilot.start_timeout=0.5",
         )  # fmt: skip
     assert done.returncode == 1
-    assert "simulator: nothing listens on tcp 127.0.0.1:" in done.stderr
+    assert "simulator: no answer on tcp 127.0.0.1:" in done.stderr
     assert len(done.stderr.strip().splitlines()) == 1
 
 

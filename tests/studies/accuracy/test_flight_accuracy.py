@@ -147,7 +147,7 @@ def test_least_accuracy_has_least_tolerance(accuracy):
     ("options", "message"),
     [
         (("--accuracy", *SHORT), "solver.accuracy: missing; set the error to compare with"),
-        (("--json", "a.json"), "--json: holds the errors of a flight; give --accuracy, too"),
+        (("--json", "a.json"), "--json: needs the errors of a flight; use it with --accuracy"),
     ],
 )
 def test_command_rejects_incomplete_request(tmp_path, options, message):

@@ -105,11 +105,11 @@ def test_folder_of_other_campaign_is_rejected_unchanged(complete, tmp_path):
     folder, _ = complete
     before = (folder.path / "campaign.json").read_text()
     for changes, differing in (({"seed": 2}, "seed"), ({"runs": 41}, "runs"), ({"vary": {}}, "vary")):
-        with pytest.raises(ValueError, match=f"holds another campaign .*{differing}"):
+        with pytest.raises(ValueError, match=f"contains another campaign .*{differing}"):
             begin_campaign(folder.path, **changes)
     assert (folder.path / "campaign.json").read_text() == before
     (tmp_path / "notes.txt").write_text("mine")
-    with pytest.raises(ValueError, match="holds other files"):
+    with pytest.raises(ValueError, match="contains other files"):
         begin_campaign(tmp_path)
     (tmp_path / "c" / "shards").mkdir(parents=True)  # another machine has just started
     assert begin_campaign(tmp_path / "c")[0].missing()
@@ -126,7 +126,7 @@ def test_two_machines_may_create_folder_at_once(tmp_path, monkeypatch):
     other = {}
     assert len(begin_campaign(tmp_path / "one")[0].missing()) == 20
     other = {"seed": 2}
-    with pytest.raises(ValueError, match=r"holds another campaign .*seed"):
+    with pytest.raises(ValueError, match=r"contains another campaign .*seed"):
         begin_campaign(tmp_path / "two")
 
 

@@ -125,7 +125,7 @@ def test_command_writes_airframe_with_provenance(plant, tmp_path):
         ("effects.h_force.coeficient", "did you mean effects.h_force.coefficient?"),
         ("flight.comand_delay", "did you mean flight.command_delay?"),
         ("zzz", "use a key that the scene"),
-        ("a,a", "names a key twice"),
+        ("a,a", "contains a key twice"),
         ("", "--free: missing"),
     ],
 )

@@ -40,7 +40,7 @@ def draw(flight: FlightData) -> Plot:
         k = min(k, len(t) - 1)
         panels.append(side_view(crate, place[k], turn[k])._replace(title=f"{t[k]:.2f} s", row=3 + i // 3, column=i % 3))
     shut = t[before.sum() :][np.abs(door[before.sum() :]) < 1.0]
-    note = f"the door is shut {shut[0] - crate['pickup']:.2f} s after pickup" if len(shut) else "the door stays open"
+    note = f"the door closes {shut[0] - crate['pickup']:.2f} s after pickup" if len(shut) else "the door stays open"
     caption = (
         "Displacements of the pack's centre until pickup (longitudinal, vertical, angular as in the paper's "
         f"Figure 28), the door's angle from shut, the contact forces on the pack, and the crate from the side; {note}."
