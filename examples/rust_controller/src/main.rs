@@ -1,7 +1,7 @@
 //! External autopilot in Rust: the service `autopilot` of a scene whose `autopilot.estimator` is "ground_truth".
 //!
 //!     lapwing protocol rust_mission.toml --json layout.json
-//!     rust_controller layout.json tcp/127.0.0.1:7450 [SPACE] &
+//!     rust_controller layout.json tcp/127.0.0.1:7450 [KEY_PREFIX] &
 //!     lapwing run rust_mission.toml --external autopilot=tcp/127.0.0.1:7450 --insecure
 
 mod bus;
@@ -24,7 +24,7 @@ fn named<'a>(ports: &'a [Port], name: &str) -> &'a Port {
 fn main() {
     let arguments: Vec<String> = std::env::args().skip(1).collect();
     let [path, listen, rest @ ..] = arguments.as_slice() else {
-        eprintln!("usage: rust_controller LAYOUT.json ENDPOINT [SPACE]");
+        eprintln!("usage: rust_controller LAYOUT.json ENDPOINT [KEY_PREFIX]");
         std::process::exit(2);
     };
     let layout = Layout::read(path);

@@ -130,7 +130,7 @@ WRONG = {
     "a link of no direction": (
         LOAD,
         "cooperative_load.link_start=[[0, 0, 0], [1, 0, 0]]",
-        "no direction, all zero",
+        "not a direction, all zero",
     ),
     "no number": (SATELLITE, "gyrostat.damping=nan", "gyrostat.damping: expected a finite number, got nan"),
     "a step below zero": (OS4, "solver.step=-0.001", "solver.step: expected a number at least 1e-09 [s], got -0.001"),
