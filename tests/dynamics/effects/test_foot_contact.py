@@ -52,13 +52,14 @@ class Foot:
         m = s.motion
         self.e, self.arm = e, apply(s.R_world_body, body)
         self.place = add(m.position_world, self.arm)
-        self.depth, self.normal = touch(e.terrain, self.place)
+        self.depth, self.normal, wedge = touch(e.terrain, self.place)
         velocity = add(m.velocity_world, cross(apply(s.R_world_body, m.omega_body), self.arm))
         self.approach = -dot(velocity, self.normal)
         self.slip = add(velocity, scale(self.approach, self.normal))
         onset = min(self.depth * e.inverse_width, 1.0)
         push = e.stiffness * self.depth + e.damping * self.approach
         self.press = max(onset * onset * (3.0 - 2.0 * onset) * push, 0.0) if self.depth > 0.0 else 0.0
+        self.load = wedge * self.press
 
     def element(self, deflection):
         """Return (friction force, rate of the deflection, "sticks" or "slides" or "flies")."""
@@ -69,7 +70,7 @@ class Foot:
         along = subtract(pull, scale(dot(pull, n), n))
         stretched = add(along, scale(e.tangential_damping, self.slip))
         y = min(math.sqrt(dot(self.slip, self.slip)) * e.inverse_stiction, 1.0)
-        limit = (e.static + (e.dynamic - e.static) * y * y * (3.0 - 2.0 * y)) * self.press
+        limit = (e.static + (e.dynamic - e.static) * y * y * (3.0 - 2.0 * y)) * self.load
         square = dot(stretched, stretched)
         slides = square > limit * limit
         held = scale(limit / math.sqrt(square), stretched) if slides else stretched
@@ -82,10 +83,10 @@ class Foot:
         e, speed = self.e, norm(self.slip)
         x = speed * e.inverse_critical
         if x < 1.0:
-            return scale(-self.press * e.static * e.inverse_critical * (1.5 - 0.5 * x * x), self.slip)
+            return scale(-self.load * e.static * e.inverse_critical * (1.5 - 0.5 * x * x), self.slip)
         y = min(2.0 * (x - 1.0), 1.0)
         coefficient = e.static + (e.dynamic - e.static) * y * y * (3.0 - 2.0 * y)
-        return scale(-coefficient * self.press / speed, self.slip)
+        return scale(-coefficient * self.load / speed, self.slip)
 
     def force(self, memory):
         return add(scale(self.press, self.normal), self.friction(memory)) if self.press > 0.0 else ZERO
