@@ -29,7 +29,7 @@ def test_normal_follows_gradient(ground):
         length = math.hypot(*rise, 1.0)
         height, normal = surface(ground, x, y)
         assert normal == pytest.approx((-rise[0] / length, -rise[1] / length, 1.0 / length), abs=1e-8)
-        depth, face = touch(ground, (x, y, height - 0.01))
+        depth, face, _ = touch(ground, (x, y, height - 0.01))
         assert depth == pytest.approx(0.01 * normal[2])
         assert face == pytest.approx(normal)
         assert over_plane(ground, (x, y, height)) <= summit(ground) + 1e-12
@@ -74,7 +74,7 @@ def test_nearest_face_of_box_pushes():
 
 def test_cylinder_pushes_out_of_its_wall_and_up():
     pillar = relief(cylinders=[(0.0, 3.0, 0.5, 2.0)])
-    depth, normal = touch(pillar, (0.3, 3.4 - 0.01 * 0.8, 1.0))
+    depth, normal, _ = touch(pillar, (0.3, 3.4 - 0.01 * 0.8, 1.0))
     assert depth == pytest.approx(0.5 - math.hypot(0.3, 0.392))
     assert normal == pytest.approx((0.3 / math.hypot(0.3, 0.392), 0.392 / math.hypot(0.3, 0.392), 0.0))
     assert touch(pillar, (0.0, 3.0, 1.99))[0] == pytest.approx(0.01)
@@ -87,7 +87,7 @@ def test_stair_up_and_down():
     heights = [surface(STAIR, x, y)[0] for x, y in ((7.0, 0.5), (0.0, 1.5), (-50.0, 2.5), (0.0, 3.5), (0.0, 500.0))]
     assert heights == pytest.approx([0.0, 0.2, 0.4, -0.5, -0.5])
     for place, outward in (((0.0, 1.01, 0.1), -1.0), ((0.0, 2.99, -0.2), 1.0)):
-        depth, normal = touch(STAIR, place)
+        depth, normal, _ = touch(STAIR, place)
         assert depth == pytest.approx(0.01)
         assert normal == pytest.approx((0.0, outward, 0.0), abs=1e-12)
 
@@ -114,7 +114,7 @@ def test_ray_down_slope_in_closed_form():
 def test_empty_terrain_is_level_ground():
     assert relief() is LEVEL
     assert surface(LEVEL, 3.0, 4.0) == (0.0, (0.0, 0.0, 1.0))
-    assert touch(LEVEL, (1.0, 2.0, -0.5)) == (0.5, (0.0, 0.0, 1.0))
+    assert touch(LEVEL, (1.0, 2.0, -0.5)) == (0.5, (0.0, 0.0, 1.0), 1.0)
 
 
 @pytest.mark.parametrize(

@@ -49,6 +49,7 @@ class FootContact(NamedTuple):
     arm: Vec3  # [m] from the centre of mass
     place: Vec3  # [m]
     press: float  # [N] normal force, 0 in the air
+    load: float  # [N] sum of the normal forces of all faces, which limits friction: more than `press` in inner corners
     slip: Vec3  # [m/s] tangential velocity, of no meaning in the air
     normal: Vec3
     depth: float  # [m] along the normal, not positive in the air
@@ -66,8 +67,8 @@ def _touch_four(terrain, places_world):
     if terrain.instance_class is Level:
 
         def level(terrain, places_world):
-            depth, normal = touch(terrain, places_world)
-            return depth, (splat(normal[0]), splat(normal[1]), splat(normal[2]))
+            depth, normal, wedge = touch(terrain, places_world)
+            return depth, (splat(normal[0]), splat(normal[1]), splat(normal[2])), splat(wedge)
 
         return level
 
@@ -83,11 +84,12 @@ def contact_of_feet(e, stance, feet_body):
     """Return the contact of four feet (theory.md, eq. (2.12))."""
     arm = apply(stance.R_world_body, feet_body)
     place = add(stance.position_world, arm)
-    depth, normal = _touch_four(e.terrain, place)
+    depth, normal, wedge = _touch_four(e.terrain, place)
     velocity = add(stance.velocity_world, cross(stance.omega_world, arm))
     approach = -dot(velocity, normal)
     onset = depth * e.inverse_width
     onset = select(1.0 - onset, onset, 1.0)
     press = onset * onset * (3.0 - 2.0 * onset) * (e.stiffness * depth + e.damping * approach)
     press = select(depth, select(press, press, 0.0), 0.0)
-    return FootContact(arm, place, press, add(velocity, scale(approach, normal)), normal, depth, approach)
+    slip = add(velocity, scale(approach, normal))
+    return FootContact(arm, place, press, wedge * press, slip, normal, depth, approach)

@@ -48,7 +48,7 @@ def _element(e, deflection, foot):
     stretched = add(subtract(pull, scale(dot(pull, n), n)), scale(e.tangential_damping, slip))
     y = sqrt(dot(slip, slip)) * e.inverse_stiction
     y = select(1.0 - y, y, 1.0)
-    limit = (e.static + (e.dynamic - e.static) * y * y * (3.0 - 2.0 * y)) * foot.press
+    limit = (e.static + (e.dynamic - e.static) * y * y * (3.0 - 2.0 * y)) * foot.load
     square = dot(stretched, stretched)
     over = square - limit * limit
     limited = select_vector(over, scale(limit / sqrt(square), stretched), stretched) if any_above(over) else stretched
@@ -63,11 +63,11 @@ def _friction(e, memory, foot):
     def smooth(e, memory, foot):
         speed = sqrt(dot(foot.slip, foot.slip))
         x = speed * e.inverse_critical
-        below = -foot.press * e.static * e.inverse_critical * (1.5 - 0.5 * x * x)
+        below = -foot.load * e.static * e.inverse_critical * (1.5 - 0.5 * x * x)
         y = 2.0 * (x - 1.0)
         y = select(1.0 - y, y, 1.0)
         coefficient = e.static + (e.dynamic - e.static) * y * y * (3.0 - 2.0 * y)
-        return scale(select(1.0 - x, below, -coefficient * foot.press / speed), foot.slip)
+        return scale(select(1.0 - x, below, -coefficient * foot.load / speed), foot.slip)
 
     return smooth
 

@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lapwing.dynamics.vector import add, dot, scale
 from lapwing.kernels import kernel, math
 
 UP = (-0.0, -0.0, 1.0)  # normal of level ground
@@ -101,29 +102,81 @@ def top(t, x, y):
 
 
 @kernel
-def _deeper(deepest, place, top_z, wall):
-    """Return the deeper of a previous result and the depth in an obstacle, measured to its nearest face."""
-    under = top_z - place[2]
-    inside, x, y = wall
-    if under <= 0.0 or inside <= 0.0:
-        return deepest
-    depth = min(under, inside)
-    if depth <= deepest[0]:
-        return deepest
-    return (depth, UP) if under <= inside else (depth, (x, y, 0.0))
+def _obstacle(t, i, place):
+    """Return (depth [m] under the top of an obstacle, distance [m] to its nearest wall, x and y of that wall's normal).
+
+    Obstacles are numbered boxes first; distances are negative outside.
+    """
+    n = t.boxes.shape[0]
+    if i < n:
+        inside, x, y = _in_box(t.boxes[i], place[0], place[1])
+        return t.boxes[i, 7] - place[2], inside, x, y
+    inside, x, y = _in_cylinder(t.cylinders[i - n], place[0], place[1])
+    return t.cylinders[i - n, 3] - place[2], inside, x, y
+
+
+@kernel
+def _corner(a, b):
+    """Return (depth, normal, wedge factor) in front of two faces: the way to the nearest point outside both."""
+    p, q, cosine = a[0], b[0], dot(a[1], b[1])
+    if q <= cosine * p and (p > 0.0 or q <= p):
+        return a
+    if p <= cosine * q and (q > 0.0 or p <= q):
+        return b
+    sine_squared = 1.0 - cosine * cosine
+    if sine_squared < PARALLEL:
+        if cosine < 0.0:
+            return BLOCKED, a[1], 1.0
+        return a if p > q else b
+    i, j = (p - cosine * q) / sine_squared, (q - cosine * p) / sine_squared
+    way = add(scale(i, a[1]), scale(j, b[1]))
+    depth = math.sqrt(dot(way, way))
+    return depth, scale(1.0 / depth, way), (i * a[2] + j * b[2]) / depth
+
+
+@kernel
+def _outward(t, ground, deepest, place, level):
+    """Return (depth, normal, wedge factor) of the way over one obstacle and out of the walls of all higher ones.
+
+    Args:
+        t: terrain.
+        ground: (depth, normal, wedge factor) in the ground without obstacles.
+        deepest: [m] largest depth in the ground or an obstacle; walls further away than that are out of reach.
+        place: [m] point.
+        level: number of the obstacle, -1 for the ground without obstacles.
+    """
+    walls, floor, under_level, found = ground, ground, -math.inf, False
+    if level >= 0:
+        under_level = _obstacle(t, level, place)[0]
+        floor = _corner(ground, (under_level, UP, 1.0))
+    for i in range(t.boxes.shape[0] + t.cylinders.shape[0]):
+        under, inside, x, y = _obstacle(t, i, place)
+        if under > max(under_level, 0.0) and inside > -deepest:
+            wall = (inside, (x, y, 0.0), 1.0)
+            walls, found = _corner(walls, wall) if found else wall, True
+    return _corner(walls, floor) if found else floor
 
 
 @kernel
 def depth(t, place):
-    """Return (depth [m] of a point in the ground or an obstacle, not positive outside; normal of the nearest face)."""
+    """Return (depth [m] of a point, not positive outside; normal; wedge factor): theory.md, eq. (2.80) and (2.81)."""
     height, a, b = field(t, place[0], place[1])
     normal = _normal(a, b)
-    result = ((height - place[2]) * normal[2], normal)
-    for i in range(t.boxes.shape[0]):
-        result = _deeper(result, place, t.boxes[i, 7], _in_box(t.boxes[i], place[0], place[1]))
-    for i in range(t.cylinders.shape[0]):
-        result = _deeper(result, place, t.cylinders[i, 3], _in_cylinder(t.cylinders[i], place[0], place[1]))
-    return result
+    ground = ((height - place[2]) * normal[2], normal, 1.0)
+    deepest, n = ground[0], t.boxes.shape[0] + t.cylinders.shape[0]
+    for i in range(n):
+        under, inside, _, _ = _obstacle(t, i, place)
+        deepest = max(deepest, min(under, inside))
+    if not deepest > 0.0:
+        return ground
+    best = _outward(t, ground, deepest, place, -1)
+    for level in range(n):
+        under, inside, _, _ = _obstacle(t, level, place)
+        if under > 0.0 and inside > -deepest:
+            over = _outward(t, ground, deepest, place, level)
+            if over[0] <= best[0]:
+                best = over
+    return best
 
 
 @kernel
@@ -151,3 +204,5 @@ def ray(t, origin, direction, longest):
 FINEST = 0.02  # [m] a ray may miss narrower objects
 CAUTION = 0.25  # step of the march relative to the gap under the ray
 HALVINGS = 50
+BLOCKED = 1e30  # [m] depth between opposite faces, which no way leads out of
+PARALLEL = 1e-9  # squared sine of the angle between two faces that count as one plane

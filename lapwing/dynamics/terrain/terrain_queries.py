@@ -60,13 +60,17 @@ def _surface(terrain, x, y):
     return lambda terrain, x, y: top(terrain, x, y)
 
 
-def touch(terrain: Any, place_world: Vec3) -> tuple[float, Vec3]:
-    """Return (depth [m] of a point below the nearest face, not positive in the air; normal of that face)."""
-    return (-place_world[2], UP) if isinstance(terrain, Level) else depth(terrain, place_world)
+def touch(terrain: Any, place_world: Vec3) -> tuple[float, Vec3, float]:
+    """Return (depth [m] of a point in the ground, not positive in the air; normal; wedge factor).
+
+    The depth is the distance to the nearest point outside, and the normal points there. The wedge factor is the sum of
+    the normal forces of all faces over their resultant: 1, and more in inner corners (theory.md, section 2.9).
+    """
+    return (-place_world[2], UP, 1.0) if isinstance(terrain, Level) else depth(terrain, place_world)
 
 
 @overload_for(touch, inline=True)
 def _touch(terrain, place_world):
     if terrain.instance_class is Level:
-        return lambda terrain, place_world: (-place_world[2], UP)
+        return lambda terrain, place_world: (-place_world[2], UP, 1.0)
     return lambda terrain, place_world: depth(terrain, place_world)

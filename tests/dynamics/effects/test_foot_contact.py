@@ -18,7 +18,11 @@ from lapwing.kernels import kernel, python_function
 add, apply, apply_transposed, cross, dot, norm, scale, subtract, rotation_matrix = map(
     python_function, (add, apply, apply_transposed, cross, dot, norm, scale, subtract, quaternion.rotation_matrix)
 )
-GROUNDS = {"level": LEVEL, "relief": relief((2e-4, -1e-4), bump_height=2e-5, bump_length=0.7)}
+GROUNDS = {
+    "level": LEVEL,
+    "relief": relief((2e-4, -1e-4), bump_height=2e-5, bump_length=0.7),
+    "corner": relief((2e-4, -1e-4), steps=[(0.2, 0.1)]),
+}
 
 
 class Seen(NamedTuple):
@@ -52,13 +56,14 @@ class Foot:
         m = s.motion
         self.e, self.arm = e, apply(s.R_world_body, body)
         self.place = add(m.position_world, self.arm)
-        self.depth, self.normal = touch(e.terrain, self.place)
+        self.depth, self.normal, wedge = touch(e.terrain, self.place)
         velocity = add(m.velocity_world, cross(apply(s.R_world_body, m.omega_body), self.arm))
         self.approach = -dot(velocity, self.normal)
         self.slip = add(velocity, scale(self.approach, self.normal))
         onset = min(self.depth * e.inverse_width, 1.0)
         push = e.stiffness * self.depth + e.damping * self.approach
         self.press = max(onset * onset * (3.0 - 2.0 * onset) * push, 0.0) if self.depth > 0.0 else 0.0
+        self.load, self.wedge = wedge * self.press, wedge
 
     def element(self, deflection):
         """Return (friction force, rate of the deflection, "sticks" or "slides" or "flies")."""
@@ -69,7 +74,7 @@ class Foot:
         along = subtract(pull, scale(dot(pull, n), n))
         stretched = add(along, scale(e.tangential_damping, self.slip))
         y = min(math.sqrt(dot(self.slip, self.slip)) * e.inverse_stiction, 1.0)
-        limit = (e.static + (e.dynamic - e.static) * y * y * (3.0 - 2.0 * y)) * self.press
+        limit = (e.static + (e.dynamic - e.static) * y * y * (3.0 - 2.0 * y)) * self.load
         square = dot(stretched, stretched)
         slides = square > limit * limit
         held = scale(limit / math.sqrt(square), stretched) if slides else stretched
@@ -82,10 +87,10 @@ class Foot:
         e, speed = self.e, norm(self.slip)
         x = speed * e.inverse_critical
         if x < 1.0:
-            return scale(-self.press * e.static * e.inverse_critical * (1.5 - 0.5 * x * x), self.slip)
+            return scale(-self.load * e.static * e.inverse_critical * (1.5 - 0.5 * x * x), self.slip)
         y = min(2.0 * (x - 1.0), 1.0)
         coefficient = e.static + (e.dynamic - e.static) * y * y * (3.0 - 2.0 * y)
-        return scale(-coefficient * self.press / speed, self.slip)
+        return scale(-coefficient * self.load / speed, self.slip)
 
     def force(self, memory):
         return add(scale(self.press, self.normal), self.friction(memory)) if self.press > 0.0 else ZERO
@@ -111,11 +116,12 @@ def drawn(rng, e):
 def test_feet_are_independent(drone, law, ground):
     (e,) = effects.from_scene({"ground_contact": {"friction": law}}, drone)
     e = e._replace(feet=(*e.feet[:4], (0.01, 0.0, -0.3501)), terrain=GROUNDS[ground])
-    rng, kinds = np.random.default_rng(1), set()
+    rng, kinds, cornered = np.random.default_rng(1), set(), 0
     for _ in range(300):
         s, memory = drawn(rng, e)
         (force, torque), points, touches, *settled = (anchored if law == "stick_slip" else smooth)(e, memory, s)
         feet = [Foot(e, s, foot) for foot in e.feet]
+        cornered += any(foot.press > 0.0 and foot.wedge > 1.0 for foot in feet)
         alone = [foot.force(anchor) for foot, anchor in zip(feet, memory, strict=True)]
         total, moment = ZERO, ZERO
         for foot, push in zip(feet, alone, strict=True):
@@ -128,4 +134,5 @@ def test_feet_are_independent(drone, law, ground):
             each = [foot.element(deflection) for foot, deflection in zip(feet, memory, strict=True)]
             assert settled == [(force, torque, tuple(rate for _, rate, _ in each))]
             kinds |= {kind for *_, kind in each}
+    assert (cornered > 20) == (ground == "corner")
     assert law == "regularised" or kinds == {"flies", "sticks", "slides"}

@@ -41,12 +41,21 @@ def test_strike_of_propeller_comes_before_feet():
 
 @pytest.mark.parametrize(
     ("kind", "seed"),
-    [("steps", 0), ("steps", 2), ("steps", 3), ("toppling", 0), ("toppling", 6), ("toppling", 7), ("strikes", 0)],
+    [
+        ("steps", 0),
+        ("steps", 2),
+        ("steps", 3),
+        ("steps", 16),
+        ("toppling", 0),
+        ("toppling", 6),
+        ("toppling", 7),
+        ("strikes", 0),
+    ],
 )
 def test_landing_at_step_toppling_or_strike_meets_accuracy(kind, seed):
     """Cases: into a wall, over an edge, over one foot onto the hull, on a propeller.
 
-    At step 2 a foot at the bottom of the wall is alternately nearest to the wall and to the ground.
+    At steps 2 and 16 a foot is in wall and ground at once.
     """
     case = cases.DRAWS[kind](seed)
     exact, events = cases.exact(case)

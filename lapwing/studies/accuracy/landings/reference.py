@@ -13,6 +13,8 @@ from scipy.optimize import brentq
 
 from lapwing.studies.accuracy.landings.reference_equations import (
     BEYOND,
+    FLOOR,
+    TOP,
     LandingBody,
     LandingGround,
     cases_at,
@@ -84,6 +86,7 @@ class _Piece:
             result = np.where(self.cases, -1.0, 1.0) * values
             result[1:BEYOND, ~self.cases[0]] = -1.0  # in the air only the touch and the faces count
             result[3, ~self.cases[2]] = -1.0
+            result[TOP:, ~self.cases[BEYOND]] = -1.0  # faces of the step count behind its wall
             return result
 
         at_end = wrong(solver.y)
@@ -151,6 +154,8 @@ def _cases_after(
     """Return the cases after an event."""
     cases = before ^ changed
     rotation = changed[BEYOND:].any(axis=0)  # at another face the cases are determined again
+    for row in (FLOOR, TOP):  # the distance from the wall depends on the case of the ground
+        cases[row, changed[BEYOND]] = (margins(body, ground, cases, y) > 0.0)[row, changed[BEYOND]]
     for _ in range(2):
         cases[:BEYOND, rotation] = (margins(body, ground, cases, y) > 0.0)[:BEYOND, rotation]
     new_contact = cases[0] & (changed[0] | changed[2])  # new contacts

@@ -2,8 +2,8 @@
 
 Independent of `lapwing.dynamics`: attitudes are matrices. The cases of a foot are those of touchdown and lift-off,
 full onset of the normal force, change of its sign, sticking and sliding, the slip at which the dynamic coefficient is
-reached (theory.md, section 2.8), and on ground with a step the nearest face: its top, its wall, or the ground before
-it (section 2.9).
+reached (theory.md, section 2.8), and on ground with a step the nearest face: its top, its wall, the ground before it,
+or wall and ground at once in the inner corner (section 2.9).
 """
 
 import math
@@ -14,7 +14,7 @@ import numpy as np
 from lapwing.kernels import kernel
 
 FULL, SLOW = 1, 4  # other rows of the cases: 0 in the ground, 2 pressing, 3 sliding
-BEYOND, TOP, FLOOR = 5, 6, 7  # of a step: behind its wall, nearer to its top than to its wall, nearest to the ground
+BEYOND, TOP, FLOOR = 5, 6, 7  # of a step: behind its wall, nearer to its top than to its wall, below the ground
 
 
 class LandingBody(NamedTuple):
@@ -51,7 +51,7 @@ class LandingGround(NamedTuple):
 
 @kernel
 def _foot(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray, i: int) -> Any:
-    """Return (arm, normal, slip, depth [m], approach [m/s], slip [m/s], shear, shear [N]) of a point, world."""
+    """Return (arm, normal, depth [m], approach [m/s], slip [m/s], shear, shear [N], wedge factor) of a point, world."""
     arm, rotation_velocity = np.zeros(3), np.zeros(3)
     b = body.points[i]
     o = y[15:18]
@@ -72,11 +72,15 @@ def _foot(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray, i: int) -> A
         ]
     )
     normal /= math.sqrt((normal * normal).sum())
-    depth = (height - y[2] - arm[2]) * normal[2]
+    depth, wedge = (height - y[2] - arm[2]) * normal[2], 1.0
     if cases[BEYOND, i] and cases[TOP, i]:
         normal, depth = np.array([0.0, 0.0, 1.0]), ground.rise - y[2] - arm[2]
     elif cases[BEYOND, i] and not cases[FLOOR, i]:
         normal, depth = np.array([-1.0, 0.0, 0.0]), y[0] + arm[0] - ground.edge
+    elif cases[BEYOND, i]:
+        behind, below = y[0] + arm[0] - ground.edge, -y[2] - arm[2]
+        depth = math.sqrt(behind * behind + below * below)
+        normal, wedge = np.array([-behind / depth, 0.0, below / depth]), (behind + below) / depth
     velocity = y[12:15] + rotation_velocity
     rising = (velocity * normal).sum()
     slip = velocity - rising * normal
@@ -84,11 +88,11 @@ def _foot(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray, i: int) -> A
     along = (deflection * normal).sum()
     shear = ground.shear_stiffness * (deflection - along * normal) + ground.shear_damping * slip
     size, speed = math.sqrt((shear * shear).sum()), math.sqrt((slip * slip).sum())
-    return arm, normal, depth, -rising, speed, shear, size
+    return arm, normal, depth, -rising, speed, shear, size, wedge
 
 
 @kernel
-def _limit(ground: Any, cases: np.ndarray, i: int, depth: float, approach: float, speed: float) -> Any:
+def _limit(ground: Any, cases: np.ndarray, i: int, depth: float, approach: float, speed: float, wedge: float) -> Any:
     """Return (normal force, friction at which the point slides) [N] under given cases."""
     if not (cases[0, i] and cases[2, i]):
         return 0.0, 0.0
@@ -96,7 +100,7 @@ def _limit(ground: Any, cases: np.ndarray, i: int, depth: float, approach: float
     onset = 1.0 if cases[FULL, i] else xi * xi * (3.0 - 2.0 * xi)
     normal_force = onset * (ground.stiffness * depth + ground.damping * approach)
     decay = slow * slow * (3.0 - 2.0 * slow) if cases[SLOW, i] else 1.0
-    return normal_force, (ground.static + (ground.dynamic - ground.static) * decay) * normal_force
+    return normal_force, (ground.static + (ground.dynamic - ground.static) * decay) * wedge * normal_force
 
 
 @kernel
@@ -118,8 +122,8 @@ def rate(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray) -> np.ndarray
         at = 18 + m + 3 * i
         stretch = -ground.shear_stiffness / ground.shear_damping * y[at : at + 3]
         if cases[0, i] and cases[2, i]:
-            arm, normal, depth, approach, speed, shear, size = _foot(body, ground, cases, y, i)
-            normal_force, limit = _limit(ground, cases, i, depth, approach, speed)
+            arm, normal, depth, approach, speed, shear, size, wedge = _foot(body, ground, cases, y, i)
+            normal_force, limit = _limit(ground, cases, i, depth, approach, speed, wedge)
             current = shear * (limit / max(size, 1e-300)) if cases[3, i] else shear
             stretch = stretch + current / ground.shear_damping
             push = normal_force * normal - current
@@ -152,13 +156,14 @@ def margins(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray) -> np.ndar
     """Return functions that are positive if a case holds, shape (8, n); their signs change at events."""
     result = np.empty((8, len(body.points)))
     for i in range(len(body.points)):
-        arm, _, depth, approach, speed, _, size = _foot(body, ground, cases, y, i)
+        arm, _, depth, approach, speed, _, size, wedge = _foot(body, ground, cases, y, i)
         result[0, i], result[1, i] = depth, depth - ground.width
         result[2, i] = ground.stiffness * depth + ground.damping * approach
-        result[3, i] = size - _limit(ground, cases, i, depth, approach, speed)[1]
+        result[3, i] = size - _limit(ground, cases, i, depth, approach, speed, wedge)[1]
         result[4, i] = ground.slow - speed
         behind, above = y[0] + arm[0] - ground.edge, y[2] + arm[2]
-        result[BEYOND, i], result[TOP, i], result[FLOOR, i] = behind, behind + above - ground.rise, -above - behind
+        outward = math.sqrt(behind * behind + above * above) if cases[FLOOR, i] else behind
+        result[BEYOND, i], result[TOP, i], result[FLOOR, i] = behind, outward + above - ground.rise, -above
     return result
 
 
