@@ -1,7 +1,7 @@
 """Run with every service in a separate process."""
 
-import os
 from collections.abc import Callable, Iterable
+from contextlib import nullcontext
 from typing import IO
 
 from lapwing.cosim.access.publisher_ids import PublisherIds, new_secret
@@ -11,6 +11,7 @@ from lapwing.cosim.processes.child_process import Child
 from lapwing.cosim.processes.interrupt import Stop
 from lapwing.cosim.processes.launcher import launch
 from lapwing.cosim.processes.run_monitor import RunMonitor
+from lapwing.cosim.processes.shared_core import CoreClaim, claim_any
 from lapwing.cosim.transport.bus_keys import check_key_prefix
 from lapwing.messages.topics import POSE, STATUS
 from lapwing.runs.compile_notice import Compilation
@@ -45,20 +46,20 @@ def fly_processes(
     clock = Clock(observer, setup)
     external = spec.external or {}
     names = [*process_table.required_processes(setup, external), *([process_table.ROUTER] if spec.open else [])]
-    core = core_of_services(setup)
+    claim = core_of_services(setup)
 
     def send_spec(name: str, endpoints: dict[str, str], stream: IO[bytes]) -> None:
         own_spec = spec._replace(
             name=name,
             peers=endpoints,
-            core=core if name in setup.services else None,
+            core=claim.core if claim and name in setup.services else None,
             open=spec.open if name == process_table.ROUTER else (),
             with_parent=True,
         )
         write_spec(own_spec, stream)
 
     participants = PublisherIds(spec.key_prefix, spec.secret, tuple(external))
-    with Stop() as stop:
+    with Stop() as stop, claim or nullcontext():
 
         def observe(watch: RunMonitor) -> bool:
             live(watch)
@@ -102,9 +103,6 @@ class Clock:
         return False
 
 
-def core_of_services(setup: RunConfig) -> int | None:
+def core_of_services(setup: RunConfig) -> CoreClaim | None:
     """Return the core for all services of a sequential lock step, which work one at a time; None for any core."""
-    if setup.coupling != "gauss_seidel" or not hasattr(os, "sched_getaffinity"):
-        return None
-    cores = sorted(os.sched_getaffinity(0))
-    return cores[os.getpid() % len(cores)]
+    return claim_any() if setup.coupling == "gauss_seidel" else None

@@ -1,6 +1,5 @@
 """TCP server of PX4's simulator interface: one firmware at a time, which may reconnect."""
 
-import select
 import socket
 
 from lapwing.services.common.firmware.link import FirmwareError
@@ -9,7 +8,7 @@ from lapwing.services.common.firmware.setup import FirmwareSetup
 from lapwing.services.px4.framing import FrameParser, Layout, frame
 from lapwing.services.px4.messages import RECEIVED
 from lapwing.services.px4.sensor_frame import COMPONENT, SYSTEM, Sensors, sensor_frame
-from lapwing.services.px4.stream import CLOSED, PIECE, WAIT, Stream, connect
+from lapwing.services.px4.stream import CLOSED, PIECE, SEND_FLAGS, WAIT, Stream, connect
 
 PORT, MAVLINK_PORT = 4560, 14540
 
@@ -61,10 +60,7 @@ class Connection:
         except OSError:
             return False
         self._peer.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-        self._peer.setblocking(False)
-        connect(self.memory, self._peer.fileno())
-        self._poll = select.poll()
-        self._poll.register(self._peer, select.POLLIN)
+        connect(self.memory, self._peer)
         return True
 
     def reject_others(self) -> bool:
@@ -84,7 +80,7 @@ class Connection:
         if self._peer is None:
             return
         try:
-            self._peer.sendall(sensor_frame(self._next_sequence(), time_us, sensors))
+            self._peer.sendall(sensor_frame(self._next_sequence(), time_us, sensors), SEND_FLAGS)
         except OSError:  # also if the buffer is full, since the firmware does not read
             self.lose()
 
@@ -100,10 +96,8 @@ class Connection:
         """Return the received messages; if `wait`, wait for them at most 0.2 s."""
         if self._peer is None:
             return []
-        if wait and not self._poll.poll(1000.0 * WAIT):
-            return []
         try:
-            data = self._peer.recv(PIECE)
+            data = self._peer.recv(PIECE, 0 if wait else socket.MSG_DONTWAIT)
         except BlockingIOError:
             return []
         except OSError:
@@ -133,7 +127,7 @@ class Connection:
     def _is_closed(peer: socket.socket) -> bool:
         """Return True if the other end has closed the connection."""
         try:
-            return not peer.recv(1, socket.MSG_PEEK)
+            return not peer.recv(1, socket.MSG_PEEK | socket.MSG_DONTWAIT)
         except BlockingIOError:
             return False
         except OSError:
@@ -146,7 +140,7 @@ class Connection:
 
     def lose(self) -> None:
         """Close the connection."""
-        connect(self.memory, -1)
+        connect(self.memory, None)
         if self._peer is not None:
             self._peer.close()
             self._peer = None

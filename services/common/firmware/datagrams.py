@@ -87,8 +87,7 @@ class DatagramSocket:
     def attach(self, bound: socket.socket) -> None:
         """Use a bound socket; a receive call ends after 0.2 s."""
         bound.setblocking(True)
-        whole, part = divmod(round(WAIT * 1e6), 1_000_000)
-        bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, struct.pack("@ll", whole, part))
+        bound.setsockopt(socket.SOL_SOCKET, socket.SO_RCVTIMEO, timeval(WAIT))
         self._socket, self.memory.descriptor[0] = bound, bound.fileno()
 
     def close(self) -> None:
@@ -152,6 +151,11 @@ def bound_socket(firmware: str, host: str, port: int, advice: str) -> socket.soc
         result.close()
         raise FirmwareError(f"{firmware}: cannot listen on udp {host}:{port} ({error.strerror}); {advice}") from None
     return result
+
+
+def timeval(seconds: float) -> bytes:
+    """Return a duration as `struct timeval`."""
+    return struct.pack("@ll", *divmod(round(seconds * 1e6), 1_000_000))
 
 
 def _host_and_port(address: np.ndarray) -> tuple[str, int]:

@@ -5,6 +5,7 @@ from typing import Any
 
 from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram
 from lapwing.cosim.diagram.compiled_block import Block, InputRing
+from lapwing.cosim.processes.shared_core import SharedCore
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels.cell import Cell
 from lapwing.services.common.firmware.block import FirmwareBlock
@@ -15,12 +16,14 @@ from lapwing.services.common.firmware.exchange import (
     LANDED,
     LAST_END,
     OPEN,
+    POLL,
     STATUS_TEXT,
     WAITING,
     Shared,
     shared_memory,
 )  # fmt: skip
 from lapwing.services.common.firmware.hold import COMMAND
+from lapwing.services.common.firmware.link import Waits
 
 _PYTHON = ctypes.CFUNCTYPE(*(ctypes.c_int64,) * 4)
 
@@ -30,6 +33,7 @@ class ExchangeBlock(FirmwareBlock):
 
     _shared: Shared | None = None
     _error: BaseException | None = None
+    _core: SharedCore | None = None
 
     def bind(self, graph: BlockDiagram) -> None:
         """Replace this block by compiled code in the diagram."""
@@ -38,6 +42,18 @@ class ExchangeBlock(FirmwareBlock):
         parameters = self._link.exchange(self._shared, self._ring)
         code = graph.prepare(Block(self.name, parameters, Cell(0)))
         graph.replace(graph.part(self.name), code)
+
+    def open(self, waits: Waits) -> None:
+        """Connect to the firmware, before the first tick."""
+        self._core = SharedCore()
+        super().open(waits)
+
+    def close(self) -> None:
+        """Close the connection."""
+        if self._core:
+            self._core.end()
+        self._core = None
+        super().close()
 
     def on_tick(self, tick: int) -> int:
         """Return NEVER: the compiled code has replaced this function."""
@@ -69,7 +85,11 @@ class ExchangeBlock(FirmwareBlock):
             if reason == OPEN:
                 if not self._opened:
                     self.open(self._waits)
+                if self._core:  # not before, because the firmware and Lapwing's compilation use several cores
+                    self._core.begin(self._link.pid)
                 return 0
+            if self._core and reason == POLL:
+                self._core.update()
             output = self._link.handle_call(
                 tick, reason, number, lambda port: self._graph.latest(port, tick), self._waits
             )

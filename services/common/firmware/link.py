@@ -83,6 +83,10 @@ class Link(Protocol):
     def open(self, waits: Waits) -> None:
         """Start the firmware or wait for it, and connect."""
 
+    @property
+    def pid(self) -> int | None:
+        """Process id of the firmware, None if this link has not started it."""
+
     def cpu(self) -> float:
         """Return the CPU time [s] that the firmware has used, 0 if this link has not started it."""
 

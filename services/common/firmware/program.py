@@ -128,12 +128,17 @@ class ProgramLink:
     _program: Program | None = None
     _time = 0.0  # [s] simulation time
 
+    @property
+    def pid(self) -> int | None:
+        """Process id of the program, None if Lapwing has not started it."""
+        return self._program.pid if self._program else None
+
     def cpu(self) -> float:
         """Return the CPU time [s] of the program, 0 if Lapwing has not started it."""
         return self._program.cpu() if self._program else 0.0
 
     def _patience(self, timeout: float) -> Patience:
-        return Patience(timeout, self._program.pid if self._program else None)
+        return Patience(timeout, self.pid)
 
     def _check_program(self) -> None:
         if self._program:

@@ -1,7 +1,8 @@
 """Scripted replacement of PX4 for complete runs: accepts a mission, arms, climbs to 2 m, descends and disarms.
 
 Started as `python scripted_px4.py -i INSTANCE`. With `--stall` it stops answering in flight; with `--starts
-FILE` it appends its instance and process id to a file.
+FILE` it appends its instance and process id to a file. With `--cores FILE` it writes, in flight, the cores of its
+thread and of each thread of its parent process.
 """
 
 import argparse
@@ -65,12 +66,25 @@ class VehicleSide:
             self._send(mavlink.MAVLink_command_ack_message(message.command, 0))
 
 
+def cores_of(status):
+    """Return the cores in a `/proc/.../status` file of a thread, such as "0-1"."""
+    return status.read_text().partition("Cpus_allowed_list:")[2].split()[0]
+
+
+def report_cores(file):
+    """Write the cores of this thread and of each thread of the parent, its main thread first."""
+    parent = os.getppid()
+    threads = sorted(Path(f"/proc/{parent}/task").iterdir(), key=lambda path: path.name != str(parent))
+    file.write_text(" ".join([cores_of(Path("/proc/self/status")), *(cores_of(path / "status") for path in threads)]))
+
+
 def main():
     """Run the flight."""
     parser = argparse.ArgumentParser()
     parser.add_argument("-i", type=int)
     parser.add_argument("--stall", action="store_true")
     parser.add_argument("--starts", type=Path)
+    parser.add_argument("--cores", type=Path)
     options = parser.parse_args()
     if options.starts:
         with options.starts.open("a") as file:
@@ -97,6 +111,9 @@ def main():
             if elapsed > 12.0:
                 vehicle.armed, duty = False, 0.0
                 peer.armed = False
+            if options.cores and elapsed > 3.0:
+                report_cores(options.cores)
+                options.cores = None
             if options.stall and elapsed > 3.0:
                 peer.receive("NEVER")
         peer.answer(time_us, (duty,) * 4)
