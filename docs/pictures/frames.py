@@ -72,7 +72,7 @@ def frames(axes: Axes, title: str, world: dict[str, tuple], body: dict[str, tupl
 
 
 def schedule(axes: Axes) -> None:
-    """What is due at which tick in the delivery mission."""
+    """Draw the messages due at each tick of the delivery mission."""
     scene = load("delivery_mission")
     exchange, last = scene[Communication], 54
     rows = []

@@ -40,7 +40,7 @@ CASES = {
     "an operator": ("hover", OPERATED, 1.2, SCRIPT),
     "an operator, on sensors": ("hover", [*SENSORS, *OPERATED], 0.6, SCRIPT),
     "a formation": ("cooperative_load", [], 0.3, None),
-    "nobody steers": ("os4_motors", [], 0.3, None),
+    "no autopilot": ("os4_motors", [], 0.3, None),
 }
 
 

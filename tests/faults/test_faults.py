@@ -19,7 +19,7 @@ FEW = {
     "the launcher stays frozen": Trial(0, "hover", "freeze", 1.0, 4.0),
     "interrupted while it starts": Trial(0, "gyrostat_attitude", "Ctrl-C", 1.0, 0.4),
     "interrupted while it compiles": Trial(1, "gyrostat_attitude", "Ctrl-C", 1.0, 3.0),
-    "whoever watches is cut off for good, with much unsent": Trial(4042, "delivery_mission", "cut off", 0.99, 1.7),
+    "run monitor is cut off for good, with much unsent": Trial(4042, "delivery_mission", "cut off", 0.99, 1.7),
     "a worker of a campaign is killed": Trial(0, "hover", "campaign worker", 0.7, 4.0),
     "a campaign is interrupted while it compiles": Trial(1, "hover", "campaign Ctrl-C", 0.9, 6.0),
     "a campaign is killed while it compiles": Trial(1, "hover", "campaign kill", 0.0, 5.0),

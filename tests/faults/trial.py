@@ -106,7 +106,7 @@ def _fly(trial: Trial, folder: Path, log: Path, timeout: float) -> Outcome:
             time.sleep(0.05)
         time.sleep(trial.delay)
         children = participants(launcher.pid)
-        everybody = {**children, LAUNCHER: launcher.pid}
+        all_pids = {**children, LAUNCHER: launcher.pid}
         names = [name for name in sorted(children) if name in _needed(trial.scene)]  # the others end early
         victim = names[int(trial.place * len(names))] if trial.place < 1.0 and names else LAUNCHER
         late = launcher.poll() is not None
@@ -115,7 +115,7 @@ def _fly(trial: Trial, folder: Path, log: Path, timeout: float) -> Outcome:
             victim = "recorder"
             _fill(log.with_name("filler"))
         else:
-            KINDS[trial.kind].strike(everybody[victim])
+            KINDS[trial.kind].strike(all_pids[victim])
         struck = time.monotonic()
         if (victim, trial.kind) == (LAUNCHER, "freeze"):
             _gone(participants(launcher.pid) | children, FROZEN)

@@ -19,7 +19,7 @@ Length = Annotated[float, Gt(0), Le(10)]
 class Settings(NamedTuple):
     """Scene table."""
 
-    release_time: Annotated[float, Ge(0)] | None = None  # [s] simulation time; never, unless told, if left out
+    release_time: Annotated[float, Ge(0)] | None = None  # [s] simulation time; default: no release without a command
     mass: Annotated[float, Gt(0)] | None = None  # [kg]; the airframe's payload if left out
     size: tuple[Length, Length, Length] = (0.20, 0.13, 0.23)  # [m] of the box along body x, y, z
 

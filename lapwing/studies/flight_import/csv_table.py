@@ -11,6 +11,9 @@ import numpy as np
 
 from lapwing.studies.flight_import.message_columns import NumberRows
 
+RATIO, SMALLEST = 100, 16_000_000  # largest size of unpacked text: relative to the file, [bytes] for small files
+BLOCK = 1 << 20  # [bytes] read at once
+
 
 def read_columns(path: Path, selected: Collection[str]) -> dict[str, np.ndarray]:
     """Return those of the selected columns that a CSV file has, by name; empty fields are NaN.
@@ -19,6 +22,7 @@ def read_columns(path: Path, selected: Collection[str]) -> dict[str, np.ndarray]
         ValueError: the file cannot be read, has no header or no rows, or a field is not a number.
     """
     try:
+        _check_unpacked_size(path)
         with warnings.catch_warnings(), _open(path) as file:
             names = [name.strip().strip('"') for name in file.readline().split(",")]
             result = [name for name in dict.fromkeys(selected) if name in names]
@@ -39,6 +43,19 @@ def read_columns(path: Path, selected: Collection[str]) -> dict[str, np.ndarray]
     if not len(table):
         raise ValueError(f"{path}: has no rows; expected a recorded flight")
     return dict(zip(result, table.T, strict=True))
+
+
+def _check_unpacked_size(path: Path) -> None:
+    """Raise ValueError if a compressed file unpacks to far more text than a flight, before it is kept in memory."""
+    if path.suffix != ".gz":
+        return
+    most, size = max(RATIO * path.stat().st_size, SMALLEST), 0
+    with gzip.open(path) as file:
+        while block := file.read(BLOCK):
+            size += len(block)
+            if size > most:
+                message = f"unpacks to over {most / 1e6:.0f} MB; expected at most {RATIO} times the size of the file"
+                raise ValueError(f"{path}: {message}")
 
 
 def _open(path: Path) -> TextIO:

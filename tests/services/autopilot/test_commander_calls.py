@@ -30,7 +30,7 @@ SHORT = [
 ]
 
 CASES = {
-    "nobody says anything": (MISSION, 4.0, {}, [OPERATOR]),
+    "no commands": (MISSION, 4.0, {}, [OPERATOR]),
     "from the ground to the ground": (MISSION, 12.0, {}, [OPERATOR, *SHORT]),
     "commands after the landing": (MISSION, 9.0, {7.5: [command("hold")], 8.2: [command("arm")]}, [OPERATOR, *SHORT]),
     "answers once a second": (MISSION, 4.0, LINK, [OPERATOR, "rates.commands=1"]),
@@ -58,12 +58,12 @@ CASES = {
     "a lost position": (MISSION, 9.0, {}, [OPERATOR, *SOON, GPS_LOST]),
     "a damaged rotor": (SCENE, 8.0, {}, [OPERATOR, *DAMAGE]),
     "on the truth": (SCENE, 4.0, LINK, [OPERATOR, *SOON]),
-    "nobody listens, a damaged rotor": (SCENE, 8.0, {}, DAMAGE),
-    "nobody listens, a lost position": (MISSION, 9.0, {}, [*SOON, GPS_LOST]),
-    "nobody listens, an emptying battery": (MISSION, 10.0, {}, BATTERY),
+    "no link, a damaged rotor": (SCENE, 8.0, {}, DAMAGE),
+    "no link, a lost position": (MISSION, 9.0, {}, [*SOON, GPS_LOST]),
+    "no link, an emptying battery": (MISSION, 10.0, {}, BATTERY),
     "no trajectory": (GROUND, 6.0, {0.04: [command("takeoff", 2.0), command("arm", NAN, 10.0)]}, []),
 }  # fmt: skip
-ROUNDS = {"nobody says anything": 4.0 * RATE / 5 + 1}
+ROUNDS = {"no commands": 4.0 * RATE / 5 + 1}
 """Count the commander steps in these flights."""
 
 

@@ -140,7 +140,7 @@ WRONG = {
         f"multibody.event=[{event(1.0, 1, 'free')}]",
         'multibody: the model rigid_body has no such table; set vehicle.model = "multibody"',
     ),
-    "a table for nobody": (
+    "an unused table": (
         [],
         "multibody.drive=speed",
         'the model rigid_body has no such table; set vehicle.model = "mul',
