@@ -1,4 +1,4 @@
-"""Case 18, edges: impact on a step, slide over an edge, take-off from a slope."""
+"""Case 18, edges: impact on a step, a foot in its inner corner, slide over an edge, take-off from a slope."""
 
 import math
 from typing import Any
@@ -7,7 +7,7 @@ import numpy as np
 
 from lapwing.dynamics import effects
 from lapwing.dynamics.environment import Environment
-from lapwing.dynamics.terrain import relief
+from lapwing.dynamics.terrain import relief, touch
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.ground_equilibrium import resting_pose, static_equilibrium
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
@@ -15,9 +15,12 @@ from lapwing.studies.stability.case_result import CaseResult, Curve, Row, Sweep
 from lapwing.studies.stability.cases.landing import DRONE, METHOD, STEP, G
 from lapwing.studies.stability.cases.slopes import DYNAMIC, energy
 
-HARD = "an impact on an upright step, a slide over an edge, a take-off from a slope: ground faces that end at corners"
+HARD = (
+    "an impact on an upright step, its inner corner, a slide over an edge, a take-off from a slope: faces with corners"
+)
 
 SPEED, RISER, DROP = 2.0, 0.1, 0.4  # [m/s], [m], [m]
+CORNER_DEPTH, SHIFT = 1e-4, 1e-12  # [m] depth in ground and wall; distance of two feet
 ANGLE, LIFT_SHARE = math.radians(20.0), 0.5  # slope; share of the weight carried by the rotors
 DENSITY = STANDARD_DENSITY
 
@@ -70,6 +73,22 @@ def baseline_energy_gain(distance: float, rise: float, speed: float = SPEED, ste
     return highest / (0.5 * speed**2)
 
 
+def force_jump() -> float:
+    """Return the relative change of the elastic force across equal depths in ground and wall."""
+    ground = relief(steps=[(1.0, RISER)])
+    depths = (touch(ground, (1.0 + CORNER_DEPTH + shift, 0.0, -CORNER_DEPTH)) for shift in (-SHIFT, SHIFT))
+    first, second = (depth * np.array(normal) for depth, normal, _ in depths)
+    return float(np.linalg.norm(first - second) / np.linalg.norm(first))
+
+
+def baseline_force_jump() -> float:
+    """Return the `force_jump` of the deeper face alone (baseline)."""
+    wall, ground = np.array((-1.0, 0.0, 0.0)), np.array((0.0, 0.0, 1.0))
+    behind = (CORNER_DEPTH - SHIFT, CORNER_DEPTH + SHIFT)
+    first, second = (x * wall if x > CORNER_DEPTH else CORNER_DEPTH * ground for x in behind)
+    return float(np.linalg.norm(first - second) / np.linalg.norm(first))
+
+
 def acceleration_under_lift(share: float) -> float:
     """Return the downhill acceleration [m/s^2] of a drone with a thrust of `share` times its weight."""
     p, state, voltage = state_at_rest(relief(slope=(0.0, math.tan(ANGLE))), share)
@@ -96,6 +115,9 @@ def run() -> CaseResult:
     rows = [
         Row("step", faces, "energy gain at a step of 10 cm, relative to the kinetic energy", 1e-9, none,
             energy_gain(0.4, RISER), field, baseline_energy_gain(0.4, RISER)),
+        Row("corner", "distance from the nearest point outside",
+            "change of the force between two points 2e-12 m apart, 0.1 mm deep in ground and wall, relative", 1e-7,
+            "distance of the points over their depth", force_jump(), "the deeper face alone", baseline_force_jump()),
         Row("edge", faces, "energy gain at an edge of 40 cm, relative to the kinetic energy", 1e-9, none,
             energy_gain(0.4, -DROP), "forward Euler on spring and damper, upright", baseline_fall()),
         Row("take_off", "friction elements, RK4 at 1 ms", newton, 1e-3, transient,
