@@ -4,7 +4,6 @@ ArduPilot sends a servo packet and waits for the state after that step, so each 
 waits for the next one. Compiled code does this (`exchange`) as long as the packets arrive in order and within 0.2 s.
 """
 
-import math
 import socket
 import time
 from collections.abc import Callable
@@ -131,7 +130,7 @@ class ArduPilotLink(ProgramLink):
         result = poll_flight(NAME, self._client, self._time)
         self.report.version = self._client.version
         self._simulated.update(self._time, read, tuple(self._shared.outputs))
-        self._shared.next_poll[0] = max(tick + 1, math.floor(self._client.next_poll / self._setup.interval))
+        self._shared.next_poll[0] = max(tick + 1, self._client.next_poll_tick(self._setup.interval))
         return result
 
     def _await(self, size: int, waits: Waits) -> None:

@@ -150,7 +150,7 @@ class Px4Link(ProgramLink):
         self.report.rejected = link.rejected + link.extra_connections
         result = self._vehicle.poll(self._time, read)
         self.report.version = self._vehicle.version
-        self._shared.next_poll[0] = max(tick + 1, math.floor(self._vehicle.next_poll / self._setup.interval))
+        self._shared.next_poll[0] = max(tick + 1, self._vehicle.next_poll_tick(self._setup.interval))
         return result
 
     def close(self) -> None:

@@ -22,10 +22,9 @@ class VehicleLink:
         self._client = MissionClient(transport, CONVENTIONS, mission_messages(items, setup.own.datum), parameters)
         self._battery, self._battery_at = setup.own.battery, 0.0  # [s] of the next message
 
-    @property
-    def next_poll(self) -> float:
-        """Simulation time [s] of the next poll."""
-        return self._client.next_poll
+    def next_poll_tick(self, interval: float) -> int:
+        """Return the tick of the next poll; `interval`: [s] of a tick."""
+        return self._client.next_poll_tick(interval)
 
     @property
     def version(self) -> str:

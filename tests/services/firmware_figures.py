@@ -105,10 +105,10 @@ def figures(log: Path, summary: Path, full: float) -> dict:
     }
 
 
-def fly(firmware: str, program: str, folder: Path, name: str, *options: str) -> dict:
+def fly(firmware: str, program: str, folder: Path, name: str, mode: str, *options: str) -> dict:
     """Fly once. Return the figures."""
     scene, log, summary = f"{firmware}_quad", folder / f"{name}.mcap", folder / f"{name}.json"
-    command = [sys.executable, "-m", "lapwing", "run", scene, "--mode", "single-process", "--log", str(log)]
+    command = [sys.executable, "-m", "lapwing", "run", scene, "--mode", mode, "--log", str(log)]
     command += ["--json", str(summary), *overrides(firmware, program), *options]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     (folder / f"{name}.txt").write_text(done.stdout + done.stderr)
@@ -123,6 +123,7 @@ def main() -> None:
     parser.add_argument("firmware", choices=VARIABLES)
     parser.add_argument("--scripted", action="store_true", help="fly the scripted program of the tests")
     parser.add_argument("--starts", type=int, default=1)
+    parser.add_argument("--mode", choices=["single-process", "multi-process"], default="single-process")
     parser.add_argument("--set", action="append", default=[])
     parser.add_argument("--out", type=Path)
     inputs = parser.parse_args()
@@ -134,7 +135,7 @@ def main() -> None:
     options = [part for value in inputs.set for part in ("--set", value)]
     results = []
     for k in range(inputs.starts):
-        results.append(fly(inputs.firmware, program, folder, f"flight_{k}", *options))
+        results.append(fly(inputs.firmware, program, folder, f"flight_{k}", inputs.mode, *options))
         print(json.dumps(results[-1]), flush=True)
     landed = [r for r in results if r["outcome"] == "landed"]
     completed = [r for r in results if r["outcome"] != "failed"] if inputs.scripted else landed

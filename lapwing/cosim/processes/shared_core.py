@@ -13,13 +13,14 @@ import errno
 import os
 import socket
 import sys
+import threading
 import time
 from collections.abc import Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Self
 
-from lapwing.cosim.processes.cpu_starvation import PROCESSORS, cpu_time
+from lapwing.cosim.processes.cpu_starvation import PROCESSORS
 
 PERIOD = 1.0  # [s] of wall time between two checks of the load
 MARGIN = 0.3  # share of a core's time by which another core must be less loaded
@@ -104,14 +105,29 @@ def busy_times() -> dict[int, float]:
     return result
 
 
-def process_tree(pid: int) -> list[int]:
-    """Return a process and its descendants; only the process if the system does not list children."""
-    result = [pid]
+def process_tree(thread: int) -> list[int]:
+    """Return a thread and the processes started by it, and by the main threads of these processes.
+
+    Args:
+        thread: id of a thread; that of a main thread is its process id.
+
+    Returns:
+        Only the thread if the system does not list children.
+    """
+    result = [thread]
     for parent in result:
-        for path in Path(f"/proc/{parent}/task").glob("*/children"):
-            with suppress(OSError):  # it has ended
-                result += [int(word) for word in path.read_text().split()]
+        with suppress(OSError):  # it has ended
+            result += map(int, Path(f"/proc/{parent}/task/{parent}/children").read_text().split())
     return result
+
+
+def cpu_time(pid: int) -> float:
+    """Return the CPU time [s] that a process has used, 0 if the system does not report it."""
+    try:
+        fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
+        return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+    except (OSError, IndexError, ValueError):
+        return 0.0
 
 
 class SharedCore:
@@ -190,9 +206,9 @@ class SharedCore:
         self._measure()
 
     def _measure(self) -> None:
-        """Store the busy times of the cores, and the CPU time of this thread and of all programs of this process."""
+        """Store the busy times of the cores, and the CPU time of this thread and of all its programs."""
         self._busy, self._at = busy_times(), time.monotonic()
-        self._own = time.thread_time() + sum(map(cpu_time, process_tree(os.getpid())[1:]))
+        self._own = time.thread_time() + sum(map(cpu_time, process_tree(threading.get_native_id())[1:]))
 
     def _move_program(self, *known: set[int]) -> None:
         """Bind the threads of the program to the core, except those whose affinity is not `known`."""

@@ -9,12 +9,19 @@ V1, V2 = 0xFE, 0xFD
 _SIGNED, _SIGNATURE, _CHECKSUM = 0x01, 13, 2  # flag; [bytes]
 
 
+MOST = 256  # message ids in `dropped`
+
+
 class FrameFilter:
-    """Filter that passes frames of selected messages of a byte stream; the decoder verifies checksums."""
+    """Filter that passes frames of selected messages of a byte stream; the decoder verifies checksums.
+
+    Attributes:
+        dropped: message ids of frames that did not pass; they may include a few that garbage resembles.
+    """
 
     def __init__(self, numbers: Collection[int]):
         """Create a filter that passes the message ids `numbers`."""
-        self._numbers = frozenset(numbers)
+        self._numbers, self.dropped = frozenset(numbers), set[int]()
         self._rest = b""
 
     def select(self, data: bytes) -> bytes:
@@ -37,6 +44,8 @@ class FrameFilter:
             number = data[at + 7] | data[at + 8] << 8 | data[at + 9] << 16 if magic == V2 else data[at + 5]
             if number in self._numbers:
                 result.append(data[at : at + length])
+            elif len(self.dropped) < MOST:
+                self.dropped.add(number)
             at += length
         self._rest = data[at:]
         return b"".join(result)

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from lapwing.cosim.processes.patience import Patience
+from lapwing.cosim.processes.shared_core import cpu_time, process_tree
 from lapwing.services.common.firmware.link import FirmwareError
 from lapwing.services.common.firmware.setup import FirmwareSetup
 
@@ -90,12 +91,8 @@ class Program:
         return self._output.read().decode(errors="replace").strip()
 
     def cpu(self) -> float:
-        """Return the CPU time [s] that it has used, or 0 if the system does not report it."""
-        try:
-            fields = Path(f"/proc/{self.pid}/stat").read_text().rpartition(")")[2].split()
-            return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
-        except (OSError, IndexError, ValueError):
-            return 0.0
+        """Return the CPU time [s] that it and its descendants use, or 0 if the system does not report it."""
+        return sum(map(cpu_time, process_tree(self.pid)))
 
     def close(self) -> None:
         """End the program and its children, and remove its temporary folder."""

@@ -243,3 +243,20 @@ def test_version_of_firmware_is_requested():
     vehicle.emit(mavlink.MAVLink_autopilot_version_message(0, 0x01110080, 0, 0, 0, [0] * 8, [0] * 8, [0] * 8, 0, 0, 0))
     client.poll(0.1)
     assert client.version == "1.17.0"
+
+
+def test_firmware_is_asked_once_to_stop_unused_messages():
+    vehicle = Vehicle()
+    client = MissionClient(vehicle, px4.CONVENTIONS, (), {})
+    for k in range(20):
+        vehicle.beat()
+        vehicle.emit(mavlink.MAVLink_attitude_message(1, 0.1, 0.2, 0.3, 0.0, 0.0, 0.0))
+        vehicle.emit(mavlink.MAVLink_vfr_hud_message(*(0,) * 6))
+        client.poll(0.1 * k)
+    stops = [m.param1 for m in vehicle.sent if m.get_type() == "COMMAND_LONG" and m.param2 == -1.0]
+    assert stops == [mavlink.MAVLINK_MSG_ID_ATTITUDE, mavlink.MAVLINK_MSG_ID_VFR_HUD]
+    client.restart()
+    vehicle.beat()
+    client.poll(3.0)
+    client.poll(3.1)
+    assert [m.param1 for m in vehicle.sent if m.get_type() == "COMMAND_LONG" and m.param2 == -1.0] == 2 * stops
