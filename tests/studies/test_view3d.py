@@ -515,7 +515,8 @@ def test_bar_follows_player_less_often_than_trail_and_body(tmp_path, page):
             while (lapwingView.time < 3.0) {
               await new Promise(requestAnimationFrame);
               bars.add(slider());
-              apart = Math.max(apart, Math.abs(lapwingView.time - __viserMutable.nodeRefFromName["/0 drone1/0 drone1"].position.z));
+              const { z } = __viserMutable.nodeRefFromName["/0 drone1/0 drone1"].position;
+              apart = Math.max(apart, Math.abs(lapwingView.time - z));
             }
             return [bars.size, (performance.now() - start) / 1000, apart];
             """

@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_header import differences, facts
+from lapwing.studies.report.key_numbers import KeyNumber, key_numbers
 from lapwing.studies.report.page import accuracy
 from lapwing.studies.report.paper import Cover
 from lapwing.studies.report.sections import labels
@@ -41,7 +42,15 @@ def cover(flights: Sequence[FlightData]) -> Cover:
                 for k, (key, v) in enumerate(differing.items())
             ),
         ),
+        _numbers(flights),
     )
+
+
+def _numbers(flights: Sequence[FlightData]) -> tuple[tuple[str, tuple[KeyNumber | None, ...]], ...]:
+    """Return the key numbers of all flights by label."""
+    tables = [{number.label: number for number in key_numbers(flight)} for flight in flights]
+    names = dict.fromkeys(label for table in tables for label in table)
+    return tuple((label, tuple(table.get(label) for table in tables)) for label in names)
 
 
 def _side_by_side(values: Sequence[str]) -> str:

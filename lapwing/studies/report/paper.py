@@ -12,9 +12,10 @@ from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from lapwing.studies.report.key_numbers import KeyNumber
 from lapwing.studies.report.matplotlib_figure import draw_plot, plot_style, show_dollars
 from lapwing.studies.report.plot import Plot
-from lapwing.studies.report.style import QUIET, TEXT, WIDTH
+from lapwing.studies.report.style import BOUND, QUIET, TEXT, WIDTH
 
 PAGE = (8.27, 11.69)  # [inch] A4
 MARGIN = 0.6  # [inch]
@@ -34,6 +35,7 @@ class Cover(NamedTuple):
     columns: tuple[str, ...] = ()  # headers of the table; the first column has the names of the rows
     rows: tuple[tuple[str, ...], ...] = ()
     facts: tuple[tuple[str, str], ...] = ()
+    numbers: tuple[tuple[str, tuple[KeyNumber | None, ...]], ...] = ()  # label and value of each flight
 
 
 class Titled(NamedTuple):
@@ -111,6 +113,17 @@ def _cover(cover: Cover) -> Figure:
     y -= line
     for outcome in cover.outcomes:
         write(outcome, 11)
+    for label, values in cover.numbers:
+        y -= 0.35 * line
+        for k, number in enumerate(values):
+            if k == 0:
+                figure.text(left, y - 0.1 * line, label, va="top", fontsize=9, color="#555555")
+            if number is not None:
+                value, looks = f"{number.value:.3g} {number.unit}", {"va": "top", "color": TEXT}
+                figure.text(left + 0.3, y, value, fontsize=11, fontweight="bold", **looks)
+                looks["color"] = "#555555" if number.good else BOUND
+                figure.text(left + 0.43, y - 0.1 * line, number.comparison, fontsize=9, **looks)
+                y -= 1.3 * line
     if cover.rows:
         y -= line
         for k, row in enumerate((cover.columns, *cover.rows)):

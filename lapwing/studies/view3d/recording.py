@@ -80,10 +80,10 @@ def _frame_times(shown: Sequence[FlightData]) -> np.ndarray:
 
 
 def _record(server: Any, shown: Sequence[FlightData], vehicles: Sequence[Vehicle], times: np.ndarray) -> Any:
-    """Record all frames; return the recording, the error [m] at the end of the colour scale, and times [s] of the trails.
+    """Record all frames; return the recording, the error [m] at the end of the colour scale, and the trails' times [s].
 
-    A trail is one line, one draw call, of which the page shows the part up to the current time. The times are those of its
-    points.
+    A trail is one line, one draw call, of which the page shows the part up to the current time. The times are those of
+    its points.
     """
     all_times = _frame_times(shown)
     trail_times = np.linspace(all_times[0], all_times[-1], min(POINTS, len(all_times)))
@@ -127,8 +127,8 @@ def with_bridge(html: str, facts: dict[str, Any]) -> str:
     Args:
         html: page of viser's client.
         facts: "names" and "colours" of the vehicles, "size" of the largest [m], "start" [s], largest "error" [m],
-            "live"; for a recording "trails", the times of the points of each trail [s], and "step", the time between two
-            frames [s].
+            "live"; for a recording "trails", the times of the points of each trail [s], and "step", the time between
+            two frames [s].
     """
     code = "".join((Path(__file__).parent / name).read_text(encoding="utf-8") for name in SCRIPTS)
     text = json.dumps(facts, separators=(",", ":")).replace("<", "\\u003c")
