@@ -320,7 +320,7 @@ def test_paper_has_outcome_errors_facts_and_every_plot(log, page, monkeypatch, t
     assert first.outcomes == (str(flight.outcome),)
     assert [row[0] for row in first.rows] == ["x [m]", "y [m]", "z [m]", "roll [°]", "pitch [°]", "yaw [°]"]
     assert dict(first.facts)["digest"]
-    assert [values for _, values in first.numbers] == [(number,) for number in key_numbers(flight)]
+    assert first.numbers == tuple((number.label, number) for number in key_numbers(flight))
     assert first.numbers
     assert len(plots) == len(page.plots)
 
@@ -329,6 +329,8 @@ def test_paper_of_two_flights_lists_keys_that_differ(log):
     flights = [FlightData.read(log), FlightData.read(log)]
     flights[1].origin.scene["autopilot"] = {"controller": "geometric:build"}
     facts = cover(flights).facts
+    numbers = cover(flights).numbers
+    assert [label for label, _ in numbers[:2]] == ["A: position error, RMS", "B: position error, RMS"]
     assert ("scenes differ in", "autopilot.controller: none | geometric:build") in facts
     assert not any(name == "scenes differ in" for name, _ in cover(flights[:1]).facts)
 

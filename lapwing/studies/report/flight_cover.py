@@ -42,15 +42,18 @@ def cover(flights: Sequence[FlightData]) -> Cover:
                 for k, (key, v) in enumerate(differing.items())
             ),
         ),
-        _numbers(flights),
+        _numbers(flights, names),
     )
 
 
-def _numbers(flights: Sequence[FlightData]) -> tuple[tuple[str, tuple[KeyNumber | None, ...]], ...]:
-    """Return the key numbers of all flights by label."""
-    tables = [{number.label: number for number in key_numbers(flight)} for flight in flights]
-    names = dict.fromkeys(label for table in tables for label in table)
-    return tuple((label, tuple(table.get(label) for table in tables)) for label in names)
+def _numbers(flights: Sequence[FlightData], names: Sequence[str]) -> tuple[tuple[str, KeyNumber], ...]:
+    """Return the key numbers of all flights with their labels, those of one kind together."""
+    many = len(flights) > 1
+    tables = [(name, key_numbers(flight)) for name, flight in zip(names, flights, strict=True)]
+    rows = [(number.label, name, number) for name, numbers in tables for number in numbers]
+    order = list(dict.fromkeys(label for label, *_ in rows))
+    rows.sort(key=lambda row: order.index(row[0]))
+    return tuple((f"{name}: {label}" if many else label, number) for label, name, number in rows)
 
 
 def _side_by_side(values: Sequence[str]) -> str:

@@ -35,7 +35,7 @@ class Cover(NamedTuple):
     columns: tuple[str, ...] = ()  # headers of the table; the first column has the names of the rows
     rows: tuple[tuple[str, ...], ...] = ()
     facts: tuple[tuple[str, str], ...] = ()
-    numbers: tuple[tuple[str, tuple[KeyNumber | None, ...]], ...] = ()  # label and value of each flight
+    numbers: tuple[tuple[str, KeyNumber], ...] = ()  # with their labels
 
 
 class Titled(NamedTuple):
@@ -113,17 +113,14 @@ def _cover(cover: Cover) -> Figure:
     y -= line
     for outcome in cover.outcomes:
         write(outcome, 11)
-    for label, values in cover.numbers:
-        y -= 0.35 * line
-        for k, number in enumerate(values):
-            if k == 0:
-                figure.text(left, y - 0.1 * line, label, va="top", fontsize=9, color="#555555")
-            if number is not None:
-                value, looks = f"{number.value:.3g} {number.unit}", {"va": "top", "color": TEXT}
-                figure.text(left + 0.3, y, value, fontsize=11, fontweight="bold", **looks)
-                looks["color"] = "#555555" if number.good else BOUND
-                figure.text(left + 0.43, y - 0.1 * line, number.comparison, fontsize=9, **looks)
-                y -= 1.3 * line
+    y -= 0.4 * line
+    for label, number in cover.numbers:
+        figure.text(left, y - 0.1 * line, label, va="top", fontsize=9, color="#555555")
+        value = f"{number.value:.3g} {number.unit}"
+        figure.text(left + 0.33, y, value, va="top", fontsize=11, fontweight="bold", color=TEXT)
+        colour = "#555555" if number.good else BOUND
+        figure.text(left + 0.46, y - 0.1 * line, number.comparison, va="top", fontsize=9, color=colour)
+        y -= 1.5 * line
     if cover.rows:
         y -= line
         for k, row in enumerate((cover.columns, *cover.rows)):
