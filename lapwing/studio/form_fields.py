@@ -18,7 +18,8 @@ FIXED = ("run.title", "run.real_time_factor", "vehicle.name")  # keys that the f
 EXTENSIBLE = ("effects", "sensors")  # tables to which the form can add tables
 MOST_ITEMS = 40  # largest number of elements with fields in a list of tables
 LONGEST = 2000  # largest number of characters of a value in the form
-_UNIT = re.compile(r"\[([^\]]*)\]\s*")
+_UNITS = re.compile(r"\[([^\]]*(?:\], \[[^\]]*)*)\]\s*")  # "[m] ...", or "[s], [m] ..." for the elements of a list
+_CHANNEL_UNIT = re.compile(r"\bu\b")  # symbol of the unit of the table, in the units of its keys
 
 
 class Field(NamedTuple):
@@ -121,19 +122,29 @@ class _Reader:
     def __init__(self, schema: Schema):
         self._schema = schema
 
-    def group(self, key: str, label: str, part: Schema, written: Any, value: Any) -> Group:
-        """Return a table; `written` is its content in the scene file, `value` includes all defaults."""
+    def group(self, key: str, label: str, part: Schema, written: Any, value: Any, unit: str = "u") -> Group:
+        """Return a table.
+
+        Args:
+            key: dotted key.
+            label: name.
+            part: schema of the table.
+            written: its content in the scene file.
+            value: its content, including all defaults.
+            unit: unit of a channel, for the values of its segments.
+        """
+        unit = _split(part)[0] or unit
         part = self._alternative(part, value if isinstance(value, dict | list) else written)
         fields: list[Field] = []
         groups: list[Group] = []
-        meaning = str(part.get("description", ""))
+        meaning = _split(part)[1]
         if isinstance(written, list) and written and isinstance(written[0], dict):  # a list of tables
             items = part.get("items", {})
             resolved = value if isinstance(value, list) and len(value) == len(written) else [{}] * len(written)
             for k, (own, full) in enumerate(zip(written[:MOST_ITEMS], resolved, strict=False)):
                 name = str(own.get("name") or own.get("kind") or k + 1)
                 shown = _own_values(full, own)
-                groups.append(self.group(f"{key}.{k}", f"{label} {name}", items, own, shown))
+                groups.append(self.group(f"{key}.{k}", f"{label} {name}", items, own, shown, unit))
             return Group(key, label, meaning, (), tuple(groups))
         properties = part.get("properties", {})
         written, value = written if isinstance(written, dict) else {}, value if isinstance(value, dict) else {}
@@ -141,11 +152,11 @@ class _Reader:
             below, inner = f"{key}.{name}", properties.get(name, {})
             own, full = written.get(name), value.get(name)
             if _is_tables(own) or isinstance(own, dict) or (own is None and isinstance(full, dict)):
-                group = self.group(below, name, inner, own, full)
+                group = self.group(below, name, inner, own, full, unit)
                 if group.fields or group.groups or isinstance(own, dict):
                     groups.append(group)
             elif not (_is_tables(full) or full == []):
-                fields += self._field(below, name, inner, full if own is None else own)
+                fields += self._field(below, name, inner, full if own is None else own, unit)
         return Group(key, label, meaning, tuple(fields), tuple(groups))
 
     def _alternative(self, part: Schema, value: Any) -> Schema:
@@ -161,16 +172,15 @@ class _Reader:
         fitting = [choice for choice in choices if _fits(choice, value)]
         return {**{k: v for k, v in part.items() if k != "anyOf"}, **(fitting or choices)[0]}
 
-    def _field(self, key: str, label: str, part: Schema, value: Any) -> list[Field]:
+    def _field(self, key: str, label: str, part: Schema, value: Any, channel_unit: str) -> list[Field]:
         text = "" if value is None else plain(value)
         if len(text) > LONGEST:
             return []
         part = self._alternative(part, value)
         if key in FIXED or len(part.get("enum", ())) == 1 or (value is None and part.get("type") == "object"):
             return []  # no choice, or a missing table
-        description = str(part.get("description", ""))
-        unit = match[1].replace("^2", "²").replace("^3", "³") if (match := _UNIT.match(description)) else ""
-        meaning = _UNIT.sub("", description, count=1) if match else description
+        unit, meaning = _split(part)
+        unit = _CHANNEL_UNIT.sub(channel_unit, unit)
         kind = {"number": "number", "integer": "integer", "string": "text", "boolean": "choice"}.get(
             str(part.get("type", "")), "toml"
         )
@@ -183,6 +193,15 @@ class _Reader:
             choices = (text, *choices)
         default = plain(part["default"]) if part.get("default") not in (None, "") else ""
         return [Field(key, label, text, kind, unit, meaning, _bounds(part), choices, default)]
+
+
+def _split(part: Schema) -> tuple[str, str]:
+    """Return unit and meaning of a description."""
+    description = str(part.get("description", ""))
+    match = _UNITS.match(description)
+    if not match:
+        return "", description
+    return match[1].replace("], [", ", ").replace("^2", "²").replace("^3", "³"), description[match.end() :]
 
 
 def _bounds(part: Schema) -> str:

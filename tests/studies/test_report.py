@@ -39,6 +39,7 @@ from lapwing.studies.report.downsampling import thin
 from lapwing.studies.report.flight_cover import cover
 from lapwing.studies.report.flight_header import MANY, differences
 from lapwing.studies.report.flight_phases import phases
+from lapwing.studies.report.key_numbers import key_numbers
 from lapwing.studies.report.overlay import overlay
 from lapwing.studies.report.plot import Line, Panel, Plot
 from lapwing.studies.report.plotly_figure import figure
@@ -319,6 +320,8 @@ def test_paper_has_outcome_errors_facts_and_every_plot(log, page, monkeypatch, t
     assert first.outcomes == (str(flight.outcome),)
     assert [row[0] for row in first.rows] == ["x [m]", "y [m]", "z [m]", "roll [°]", "pitch [°]", "yaw [°]"]
     assert dict(first.facts)["digest"]
+    assert first.numbers == tuple((number.label, number) for number in key_numbers(flight))
+    assert first.numbers
     assert len(plots) == len(page.plots)
 
 
@@ -326,6 +329,8 @@ def test_paper_of_two_flights_lists_keys_that_differ(log):
     flights = [FlightData.read(log), FlightData.read(log)]
     flights[1].origin.scene["autopilot"] = {"controller": "geometric:build"}
     facts = cover(flights).facts
+    numbers = cover(flights).numbers
+    assert [label for label, _ in numbers[:2]] == ["A: position error, RMS", "B: position error, RMS"]
     assert ("scenes differ in", "autopilot.controller: none | geometric:build") in facts
     assert not any(name == "scenes differ in" for name, _ in cover(flights[:1]).facts)
 

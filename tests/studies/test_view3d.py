@@ -25,7 +25,7 @@ from lapwing.studies.view3d.local_server import run_server
 from lapwing.studies.view3d.recording import page as view_page
 from lapwing.studies.view3d.rotors import Rotors
 from lapwing.studies.view3d.samples import sample
-from lapwing.studies.view3d.sampling import along, dashes
+from lapwing.studies.view3d.sampling import along, dashes, thin_path
 from lapwing.studies.view3d.stage import Vehicle, error_colours, reach
 from lapwing.studies.view3d.surroundings import add_surroundings
 from lapwing.studies.view3d.vehicle_bodies import motion
@@ -50,6 +50,40 @@ def volume(solid):
 )
 def test_solids_have_their_volume_and_face_outwards(solid, expected):
     assert volume(solid) == pytest.approx(expected, rel=0.03)
+
+
+def test_rotor_disc_is_closed_and_above_its_hub():
+    disc = solids.disc((1.0, 2.0, 3.0), 2.0, "#000000")
+    assert volume(disc) == pytest.approx(np.pi * 4.0 * 0.02 / 3.0, rel=0.03)  # two cones, together 0.01 radii high
+    assert disc.vertices.min(axis=0) == pytest.approx([-1.0, 0.0, 3.1])
+    assert disc.vertices.max(axis=0) == pytest.approx([3.0, 4.0, 3.12])
+
+
+def test_straight_path_is_thinned_to_its_corners():
+    corners = np.array([(0.0, 0.0), (8.0, 0.0), (8.0, 2.0)])
+    path = np.column_stack([np.interp(np.arange(21), (0, 10, 20), corners[:, i]) for i in (0, 1)])
+    assert thin_path(path, 1e-6).tolist() == [0, 10, 20]
+
+
+def test_path_at_unequal_speed_keeps_its_times():
+    path = np.column_stack([np.interp(np.arange(21), (0, 10, 20), (0.0, 1.0, 9.0)), np.zeros(21)])  # a straight line
+    assert thin_path(path, 1e-6).tolist() == [0, 10, 20]
+
+
+def test_thinned_parabola_has_pieces_of_known_length():
+    t = np.arange(1025) / 1024.0
+    path, tolerance = np.column_stack([t, t**2]), 1.01 / 4.0 / 16.0**2
+    keep = thin_path(path, tolerance)  # a chord of duration h is h^2 / 4 away from t^2
+    assert np.diff(t[keep]) == pytest.approx(np.full(16, 1.0 / 16.0))
+    drawn = np.column_stack([np.interp(t, t[keep], path[keep, i]) for i in (0, 1)])
+    assert np.abs(drawn - path).max() <= tolerance
+
+
+def test_thinned_path_keeps_points_beside_gap():
+    path = np.arange(9.0)[:, None] * np.array([1.0, 2.0])
+    path[4] = np.nan
+    keep = thin_path(path, 1e-6).tolist()
+    assert {3, 4, 5} <= set(keep)
 
 
 def test_rod_ends_at_its_points():
@@ -464,6 +498,37 @@ def test_view_opens_at_event_that_was_chosen_before(tmp_path, page):
 
 @pytest.mark.long
 @pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
+def test_bar_follows_player_less_often_than_trail_and_body(tmp_path, page):
+    path = tmp_path / "view.html"
+    path.write_text(embedded(page), encoding="utf-8")
+    with chromium.Browser(path, tmp_path / "profile") as browser:
+        bars, seconds, apart = browser.run(
+            READY
+            + """
+            const slider = () => Number(document.querySelector("[role=slider]").getAttribute("aria-valuenow"));
+            lapwingView.seek(0.5);
+            await until(() => Math.abs(lapwingView.time - 0.5) < 0.01);
+            document.activeElement.blur();
+            dispatchEvent(new KeyboardEvent("keydown", { code: "Space" })); // plays again
+            const bars = new Set(), start = performance.now();
+            let apart = 0, before = 0.5;
+            while (lapwingView.time < 3.0) {
+              await new Promise(requestAnimationFrame);
+              bars.add(slider());
+              const { z } = __viserMutable.nodeRefFromName["/0 drone1/0 drone1"].position;
+              apart = Math.max(apart, Math.abs(lapwingView.time - z) - Math.abs(z - before)); // one image late at most
+              before = z;
+            }
+            return [bars.size, (performance.now() - start) / 1000, apart];
+            """
+        )
+        assert browser.errors == []
+    assert bars <= 10.0 * seconds + 3
+    assert apart < 0.05  # [m] at 1 m/s: one frame of the recording
+
+
+@pytest.mark.long
+@pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
 def test_fleet_is_drawn_in_few_calls_and_only_on_change(tmp_path):
     first = flight()
     for k in range(1, 8):
@@ -477,7 +542,7 @@ def test_fleet_is_drawn_in_few_calls_and_only_on_change(tmp_path):
     path = tmp_path / "view.html"
     path.write_text(view_page([first], [first.vehicle]), encoding="utf-8")
     with chromium.Browser(path, tmp_path / "profile", size=(960, 540)) as browser:
-        calls, share, names, frames, seconds, after = browser.run(
+        calls, trail, names, frames, seconds, after = browser.run(
             READY
             + """
             lapwingView.seek(1.0);
@@ -492,11 +557,15 @@ def test_fleet_is_drawn_in_few_calls_and_only_on_change(tmp_path):
               }
             };
             await still();
-            const shares = [];
-            __viserMutable.nodeRefFromName["/0 drone1/trail"].traverse(({ geometry }) => {
-              const pieces = geometry?.attributes.instanceStart?.count;
-              if (pieces) shares.push(geometry.instanceCount / pieces);
-            });
+            const ends = () => {
+              const result = [];
+              __viserMutable.nodeRefFromName["/0 drone1/trail"].traverse(({ geometry }) => {
+                const last = geometry?.instanceCount - 1, end = geometry?.attributes.instanceEnd;
+                if (end) result.push([geometry.instanceCount, end.getX(last), end.getY(last), end.getZ(last)]);
+              });
+              return result;
+            };
+            const early = ends();
             const tree = __viserSceneTree.getState();
             const names = Object.keys(tree).filter((name) => name.endsWith("/label") && tree[name].effectiveVisibility);
             const calls = __viserTestpoints.rendererInfo.render.calls;
@@ -505,12 +574,14 @@ def test_fleet_is_drawn_in_few_calls_and_only_on_change(tmp_path):
             const frames = lapwingView.frames() - begin, seconds = (performance.now() - start) / 1000;
             lapwingView.seek(3.0);
             await until(() => Math.abs(lapwingView.camera().target[1] - 3.0) < 0.05);
-            return [calls, shares, names.length, frames, seconds, lapwingView.frames() - begin - frames];
+            return [calls, [...early, ...ends()], names.length, frames, seconds, lapwingView.frames() - begin - frames];
             """
         )
         assert browser.errors == []
     assert calls < 80
-    assert share == pytest.approx([1.0 / 3.99], abs=0.01)  # part up to the current time
+    assert np.array(trail) == pytest.approx(
+        np.array([(1, 0, 0, 1), (1, 0, 0, 3)]), abs=0.01
+    )  # one piece, up to the time
     assert 1 <= names < 8  # covered labels are hidden
     assert frames <= 2.0 * seconds  # of 60 per second; viser draws one per second, with late ones on a busy machine
     assert after > 0

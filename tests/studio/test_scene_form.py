@@ -1,5 +1,6 @@
 """Forms of scenes: fields from the schema, overrides from texts, command line and Python."""
 
+import re
 import shlex
 
 import pytest
@@ -39,6 +40,19 @@ def test_segments_of_phases_have_fields_of_their_kind(schema):
     by_key = fields("delivery_mission", schema)
     assert by_key["trajectory.phase.1.z.rate"].text == "1.0"
     assert by_key["trajectory.phase.1.z.rate"].bounds == "above 0"
+
+
+def test_segments_have_units_of_their_channel(schema):
+    by_key = fields("delivery_mission", schema)
+    assert (by_key["trajectory.phase.1.z.to"].unit, by_key["trajectory.phase.1.z.rate"].unit) == ("m", "m/s")
+    units = {key: field.unit for key, field in by_key.items() if key.endswith((".yaw.to", ".yaw.rate"))}
+    assert set(units.values()) <= {"rad", "rad/s"}
+    assert units
+
+
+@pytest.mark.parametrize("scene", sorted(path.stem for path in SHIPPED.glob("*.toml")))
+def test_units_are_known_without_symbols(scene, schema):
+    assert not [key for key, field in fields(scene, schema).items() if re.search(r"\bu\b", field.unit)]
 
 
 @pytest.mark.parametrize("scene", sorted(path.stem for path in SHIPPED.glob("*.toml")))

@@ -109,6 +109,8 @@ def test_form_shows_units_ranges_and_help(studio):
     assert 'value="1.0"' in field
     assert '<span class="unit">m/s</span>' in field
     assert "of each axis; 0 to 30" in field
+    assert "content of the file that <code>vehicle.airframe</code> names" in text
+    assert "`" not in text
 
 
 def test_search_finds_scenes_by_title(studio):

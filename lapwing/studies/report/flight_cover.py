@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.flight_header import differences, facts
+from lapwing.studies.report.key_numbers import KeyNumber, key_numbers
 from lapwing.studies.report.page import accuracy
 from lapwing.studies.report.paper import Cover
 from lapwing.studies.report.sections import labels
@@ -41,7 +42,18 @@ def cover(flights: Sequence[FlightData]) -> Cover:
                 for k, (key, v) in enumerate(differing.items())
             ),
         ),
+        _numbers(flights, names),
     )
+
+
+def _numbers(flights: Sequence[FlightData], names: Sequence[str]) -> tuple[tuple[str, KeyNumber], ...]:
+    """Return the key numbers of all flights with their labels, those of one kind together."""
+    many = len(flights) > 1
+    tables = [(name, key_numbers(flight)) for name, flight in zip(names, flights, strict=True)]
+    rows = [(number.label, name, number) for name, numbers in tables for number in numbers]
+    order = list(dict.fromkeys(label for label, *_ in rows))
+    rows.sort(key=lambda row: order.index(row[0]))
+    return tuple((f"{name}: {label}" if many else label, number) for label, name, number in rows)
 
 
 def _side_by_side(values: Sequence[str]) -> str:

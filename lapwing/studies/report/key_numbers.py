@@ -30,6 +30,14 @@ class KeyNumber(NamedTuple):
             return True
         return self.value >= self.limit if self.at_least else self.value <= self.limit
 
+    @property
+    def comparison(self) -> str:
+        """Value relative to the limit as text, e.g. "within 0.35 m (source)"; "" without a limit."""
+        if self.limit is None:
+            return ""
+        sides = ("above", "below") if self.at_least else ("within", "beyond")
+        return f"{sides[not self.good]} {self.limit:.3g} {self.unit} ({self.source})"
+
 
 def key_numbers(flight: FlightData) -> list[KeyNumber]:
     """Return up to five numbers: errors, touch-down, distance from the target, battery or energy."""

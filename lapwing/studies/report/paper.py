@@ -12,9 +12,10 @@ from matplotlib.backends.backend_pdf import PdfPages
 from matplotlib.figure import Figure
 from matplotlib.layout_engine import ConstrainedLayoutEngine
 
+from lapwing.studies.report.key_numbers import KeyNumber
 from lapwing.studies.report.matplotlib_figure import draw_plot, plot_style, show_dollars
 from lapwing.studies.report.plot import Plot
-from lapwing.studies.report.style import QUIET, TEXT, WIDTH
+from lapwing.studies.report.style import BOUND, QUIET, TEXT, WIDTH
 
 PAGE = (8.27, 11.69)  # [inch] A4
 MARGIN = 0.6  # [inch]
@@ -34,6 +35,7 @@ class Cover(NamedTuple):
     columns: tuple[str, ...] = ()  # headers of the table; the first column has the names of the rows
     rows: tuple[tuple[str, ...], ...] = ()
     facts: tuple[tuple[str, str], ...] = ()
+    numbers: tuple[tuple[str, KeyNumber], ...] = ()  # with their labels
 
 
 class Titled(NamedTuple):
@@ -111,6 +113,14 @@ def _cover(cover: Cover) -> Figure:
     y -= line
     for outcome in cover.outcomes:
         write(outcome, 11)
+    y -= 0.4 * line
+    for label, number in cover.numbers:
+        figure.text(left, y - 0.1 * line, label, va="top", fontsize=9, color="#555555")
+        value = f"{number.value:.3g} {number.unit}"
+        figure.text(left + 0.33, y, value, va="top", fontsize=11, fontweight="bold", color=TEXT)
+        colour = "#555555" if number.good else BOUND
+        figure.text(left + 0.46, y - 0.1 * line, number.comparison, va="top", fontsize=9, color=colour)
+        y -= 1.5 * line
     if cover.rows:
         y -= line
         for k, row in enumerate((cover.columns, *cover.rows)):

@@ -12,6 +12,34 @@
 
   const view = { mode: "follow", vehicle: 0, fresh: true, time: null };
   window.lapwingView = view;
+
+  // React draws the player's bar and other controls each time the player moves on, which takes longer than drawing the
+  // scene. Its scheduler uses `setImmediate` where it exists; this one starts at most ten runs a second.
+  const CONTROLS = 100; // [ms] between two runs
+  const { port1: starts, port2: ends } = new MessageChannel(), runs = [], postponed = [];
+  let began = 0, busy = false; // time of the last start [ms]; whether a run is in progress
+  ends.onmessage = () => {
+    busy = true; // a run in several parts is not interrupted
+    try {
+      runs.shift()();
+    } finally {
+      busy = false;
+    }
+  };
+  const isDue = () => busy || !view.ready || view.filming || document.hidden || performance.now() >= began + CONTROLS;
+  function drawControls() {
+    if (!postponed.length || !isDue()) return;
+    began = performance.now();
+    for (const run of postponed.splice(0)) {
+      runs.push(run);
+      starts.postMessage(0);
+    }
+  }
+  window.setImmediate = (run) => {
+    postponed.push(run);
+    drawControls();
+  };
+
   const client = () => window.__viserMutable; // scene of viser's client, exposed for its tests
   const state = () => client()?.scene?.__r3f?.root.getState();
 
@@ -35,12 +63,27 @@
     return { place: [m[12], m[13], m[14]], ahead: [m[0], m[1], m[2]], up: [m[8], m[9], m[10]] };
   }
 
-  function showTrails() { // shows the part of each trail up to the current time; its points have equal time steps
-    if (!facts.span) return;
-    const share = (view.time - facts.span[0]) / (facts.span[1] - facts.span[0]);
-    facts.names.forEach((_, k) => node("trail", k)?.traverse(({ geometry }) => {
-      const pieces = geometry?.attributes.instanceStart?.count;
-      if (pieces) geometry.instanceCount = Math.floor(Math.min(Math.max(share, 0), 1) * pieces + 1e-6);
+  const cut = new WeakMap(); // true end of the shortened piece of a trail: its index in the buffer and its coordinates
+  function showTrails() { // shows each trail up to the current time; its last piece is shortened
+    facts.trails?.forEach((times, k) => node("trail", k)?.traverse(({ geometry }) => {
+      if (!geometry?.attributes.instanceEnd) return;
+      const { instanceStart: { offset: first }, instanceEnd: { data, offset } } = geometry.attributes, { array, stride } = data;
+      const change = (at, values) => {
+        array.set(values, at);
+        data.addUpdateRange(at, 3);
+        data.needsUpdate = true;
+      };
+      if (cut.has(geometry)) change(...cut.get(geometry));
+      cut.delete(geometry);
+      const next = times.findIndex((time) => time > view.time), whole = (next < 0 ? times.length : next) - 1;
+      geometry.instanceCount = Math.max(whole, 0);
+      if (whole < 0 || next < 0) return;
+      const share = (view.time - times[whole]) / (times[next] - times[whole]), at = whole * stride;
+      const start = array.slice(at + first, at + first + 3), end = array.slice(at + offset, at + offset + 3);
+      if (share <= 0) return;
+      cut.set(geometry, [at + offset, end]);
+      change(at + offset, start.map((value, i) => value + share * (end[i] - value)));
+      geometry.instanceCount += 1;
     }));
   }
 
@@ -65,6 +108,17 @@
       if (free) boxes.push(box);
       entry.effectiveVisibility = free;
     }
+  }
+
+  function barTime() { // time of the player's bar [s]; null without a player
+    const slider = document.querySelector("[role=slider]");
+    return slider && Number(slider.getAttribute("aria-valuenow")) + facts.start;
+  }
+  function timeNow() { // time of the bar, or of the scene if the bar is not up to date
+    const bar = barTime(), clock = client()?.nodePoseData["/clock"];
+    if (clock?.poseUpdateState !== "updated") return view.time ?? bar;
+    const scene = clock.position[0] + facts.start;
+    return scene <= bar && bar < scene + facts.step ? bar : scene;
   }
 
   let drawn = "", placed = "", changed = 0; // keys of the last drawn and placed state, time of the last change [ms]
@@ -105,10 +159,9 @@
       view.fresh = false;
       if (view.shown) view.ready = true;
     }
-    const slider = document.querySelector("[role=slider]");
-    if (slider) {
+    if (barTime() !== null) {
       view.shown = true;
-      const time = Number(slider.getAttribute("aria-valuenow")) + facts.start;
+      const time = timeNow();
       if (time !== view.time) {
         view.time = time;
         if (parent !== window) parent.postMessage({ lapwing: "time", time }, "*");
@@ -117,6 +170,7 @@
   }
   function steer() {
     if (view.filming) return;
+    drawControls();
     follow();
     requestAnimationFrame(steer);
   }
@@ -148,6 +202,7 @@
     const now = state(), canvas = now.gl.domElement, { render } = now.gl, pictures = [];
     if (!view.filming) {
       view.filming = true;
+      drawControls();
       now.setFrameloop("never");
       document.getElementById("lapwing").remove();
       canvas.style.visibility = "hidden"; // no compositing needed
@@ -160,10 +215,7 @@
     };
     for (const time of times) {
       view.seek(time);
-      for (let k = 0; k < 100 && !(Math.abs(view.time - time) < 2e-3); k++) {
-        await turn();
-        follow();
-      }
+      for (let k = 0; k < 100 && !(Math.abs(barTime() - time) < 2e-3); k++) await turn();
       pass(false); // viser processes the messages of this time
       await turn(); // its page updates its state
       pass(false); // moves the bodies

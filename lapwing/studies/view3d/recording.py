@@ -11,7 +11,8 @@ from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.style import COLOURS
 from lapwing.studies.view3d import require
 from lapwing.studies.view3d.local_server import run_server
-from lapwing.studies.view3d.samples import sample
+from lapwing.studies.view3d.samples import Samples, sample
+from lapwing.studies.view3d.sampling import thin_path
 from lapwing.studies.view3d.scans import BUDGET
 from lapwing.studies.view3d.stage import Vehicle, reach, vehicle_colours
 from lapwing.studies.view3d.surroundings import add_surroundings
@@ -20,7 +21,8 @@ RATE = 30.0  # [1/s] frame rate of a recording
 FRAMES = 2000  # largest number of frames of a recording; the rate of a longer one is lower
 FLEET_FRAMES = 24000  # largest number of frames times vehicles
 SCRIPTS = ("software.js", "bridge.js", "toolbar.js")
-POINTS = 1500  # largest number of points of a trail
+POINTS = 1500  # largest number of points of a trail, before those are removed that it can be drawn without
+PLACE, TINT = 0.02, 0.05  # errors of a trail's place and colour, over the size of the vehicle and the colour scale
 
 
 def page(flights: Sequence[FlightData], names: Sequence[str], times: np.ndarray | None = None) -> str:
@@ -54,7 +56,7 @@ def page(flights: Sequence[FlightData], names: Sequence[str], times: np.ndarray 
             Vehicle(server.scene, k, flight, title, colour, ghost=compared and k > 0, named=len(shown) > 1)
             for k, (flight, title, colour) in enumerate(zip(shown, titles, colours, strict=True))
         ]
-        recording, most, span = _record(server, shown, vehicles, times)
+        recording, most, trails = _record(server, shown, vehicles, times)
         html: str = recording.as_html()
     facts = {
         "names": titles,
@@ -62,7 +64,8 @@ def page(flights: Sequence[FlightData], names: Sequence[str], times: np.ndarray 
         "size": max(reach(vehicle.motion) for vehicle in vehicles),
         "start": float(times[0]),
         "error": most,
-        "span": span,
+        "trails": trails,
+        "step": float(times[1] - times[0]),
         "live": False,
     }
     return with_bridge(html, facts)
@@ -77,30 +80,45 @@ def _frame_times(shown: Sequence[FlightData]) -> np.ndarray:
 
 
 def _record(server: Any, shown: Sequence[FlightData], vehicles: Sequence[Vehicle], times: np.ndarray) -> Any:
-    """Record all frames; return the recording, the error [m] at the end of the colour scale, and the trails' span [s].
+    """Record all frames; return the recording, the error [m] at the end of the colour scale, and the trails' times [s].
 
-    A trail is one line, one draw call, of which the page shows the part up to the current time.
+    A trail is one line, one draw call, of which the page shows the part up to the current time. The times are those of
+    its points.
     """
     all_times = _frame_times(shown)
     trail_times = np.linspace(all_times[0], all_times[-1], min(POINTS, len(all_times)))
     paths = [sample(flight, vehicle.motion, trail_times) for flight, vehicle in zip(shown, vehicles, strict=True)]
     errors = [path.error for path in paths if path.error is not None]
     most = float(max(np.quantile(error, 0.995) for error in errors)) if errors else 0.0
+    trails = []
     for vehicle, path in zip(vehicles, paths, strict=True):
         if path.desired is not None:
             vehicle.desired_path(path.desired)
-        vehicle.trail(path.bodies[0].position, path.error, most)
+        keep = _trail_points(vehicle, path, most)
+        error = None if path.error is None else path.error[keep]
+        vehicle.trail(path.bodies[0].position[keep], error, most)
+        trails.append(np.round(trail_times[keep], 3).tolist())
     points = BUDGET // len(shown)
     samples = [sample(flight, vehicle.motion, times, points) for flight, vehicle in zip(shown, vehicles, strict=True)]
     for vehicle, result in zip(vehicles, samples, strict=True):
         vehicle.show(result, 0)
+    clock = server.scene.add_frame("/clock", show_axes=False)  # its x is the time since the start [s]
     recording = server.get_scene_serializer()
     for k in range(len(times)):
+        clock.position = (float(times[k] - times[0]), 0.0, 0.0)
         for vehicle, result in zip(vehicles, samples, strict=True):
             vehicle.show(result, k)
         if k + 1 < len(times):
             recording.insert_sleep(float(times[k + 1] - times[k]))
-    return recording, most, (float(all_times[0]), float(all_times[-1]))
+    return recording, most, trails
+
+
+def _trail_points(vehicle: Vehicle, path: Samples, most: float) -> np.ndarray:
+    """Return the indices of the points with which the line has the place and colour of the complete path."""
+    columns, tolerance = path.bodies[0].position, PLACE * reach(vehicle.motion)
+    if path.error is not None and most > 0.0:
+        columns = np.column_stack([columns, np.nan_to_num(path.error) * tolerance / (TINT * most)])
+    return thin_path(columns, tolerance)
 
 
 def with_bridge(html: str, facts: dict[str, Any]) -> str:
@@ -109,7 +127,8 @@ def with_bridge(html: str, facts: dict[str, Any]) -> str:
     Args:
         html: page of viser's client.
         facts: "names" and "colours" of the vehicles, "size" of the largest [m], "start" [s], largest "error" [m],
-            "live"; for a recording "span", the times of the first and the last point of the trails [s].
+            "live"; for a recording "trails", the times of the points of each trail [s], and "step", the time between
+            two frames [s].
     """
     code = "".join((Path(__file__).parent / name).read_text(encoding="utf-8") for name in SCRIPTS)
     text = json.dumps(facts, separators=(",", ":")).replace("<", "\\u003c")

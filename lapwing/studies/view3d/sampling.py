@@ -47,6 +47,31 @@ def dashes(path: np.ndarray, length: float, most: int) -> np.ndarray:
     return result[np.isfinite(result).all(axis=(1, 2))]
 
 
+def thin_path(path: np.ndarray, tolerance: float) -> np.ndarray:
+    """Return ascending indices of the points of a path that suffice to draw it, with the first and the last.
+
+    Args:
+        path: points at equal time steps, shape (n, k), n >= 2.
+        tolerance: largest distance between a point and the straight line between the remaining points at its time.
+
+    Source: Douglas, Peucker, 1973, with the distance at equal times instead of the shortest one.
+    """
+    keep = np.zeros(len(path), bool)
+    keep[[0, -1]] = True
+    pieces = [(0, len(path) - 1)]
+    while pieces:
+        first, last = pieces.pop()
+        if last - first < 2:
+            continue
+        share = np.linspace(0.0, 1.0, last - first + 1)[:, None]
+        apart = np.linalg.norm(path[first : last + 1] - (1.0 - share) * path[first] - share * path[last], axis=1)
+        worst = first + int(np.argmax(np.nan_to_num(apart, nan=np.inf)))
+        if not apart[worst - first] <= tolerance:  # also at NaN
+            keep[worst] = True
+            pieces += [(first, worst), (worst, last)]
+    return np.flatnonzero(keep)
+
+
 def round_angle(angle: np.ndarray) -> np.ndarray:
     """Return angles [rad] rounded to 1 / ANGLES of a revolution."""
     step = 2.0 * np.pi / ANGLES

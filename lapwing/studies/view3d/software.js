@@ -11,11 +11,23 @@
     return context.call(this, kind, slow && kind === "webgl2" ? { ...options, ...CHEAP, antialias: smooth } : options);
   };
 
-  function flattenSky(scene) { // draws the background first instead of at a depth, which each of its pixels would write
+  const ROWS = 32; // strips of the sky
+  function flattenSky(scene) { // draws the background first as strips of interpolated colours, without texture and depth
     scene.traverse((object) => {
-      const { material } = object;
-      if (!material?.uniforms?.colorMap?.value) return;
-      material.fragmentShader = "varying vec2 vUv; uniform sampler2D colorMap; void main() { gl_FragColor = vec4(texture(colorMap, vUv).rgb, 1.0); }";
+      const { geometry, material } = object, image = material?.uniforms?.colorMap?.value?.image;
+      if (!image?.width) return;
+      const drawing = Object.assign(document.createElement("canvas"), { width: 1, height: image.height }).getContext("2d");
+      drawing.drawImage(image, 0, 0);
+      const { data } = drawing.getImageData(0, 0, 1, image.height), { width, height } = geometry.parameters;
+      const strips = new geometry.constructor(width, height, 1, ROWS), { uv } = strips.attributes;
+      const tints = Array.from({ length: uv.count }, (_, k) => {
+        const row = Math.round((1 - uv.getY(k)) * (image.height - 1));
+        return [...data.slice(4 * row, 4 * row + 3)].map((value) => value / 255);
+      });
+      strips.setAttribute("tint", new uv.constructor(tints.flat(), 3));
+      object.geometry = strips;
+      material.vertexShader = "attribute vec3 tint; varying vec3 vTint; void main() { vTint = tint; gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0); }";
+      material.fragmentShader = "varying vec3 vTint; void main() { gl_FragColor = vec4(vTint, 1.0); }";
       Object.assign(material, { depthTest: false, depthWrite: false, needsUpdate: true });
       object.renderOrder = -1;
     });
@@ -36,7 +48,7 @@
       for (const { value } of [cellColor, sectionColor]) value.setRGB(...onScreen(value));
       for (const { value } of [cellColor, sectionColor, planeColor]) value.convertLinearToSRGB();
       shadowOpacity.value = 1 - (1 - shadowOpacity.value) ** (1 / 2.2);
-      const fragmentShader = material.fragmentShader.replace("#include <colorspace_fragment>", "");
+      const fragmentShader = material.fragmentShader.replace("#include <colorspace_fragment>", "").replace("pow(d, fadeStrength)", "d");
       Object.assign(material, { fragmentShader, toneMapped: false, needsUpdate: true });
     });
   }

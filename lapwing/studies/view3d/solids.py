@@ -46,8 +46,9 @@ def rod(start: Point, stop: Point, radius: float, colour: str, opacity: float = 
 
 
 def disc(hub: Point, radius: float, colour: str, opacity: float = 1.0) -> Solid:
-    """Return the disc of a rotor about z, slightly above its hub."""
-    return rod(raise_point(hub, 0.05 * radius), raise_point(hub, 0.06 * radius), radius, colour, opacity)
+    """Return the disc of a rotor about z, slightly above its hub: two flat cones, half of the faces of a cylinder."""
+    solid = solid_of_revolution([(0.0, 0.05 * radius), (radius, 0.055 * radius), (0.0, 0.06 * radius)], colour, opacity)
+    return solid._replace(vertices=solid.vertices + np.asarray(hub, float))
 
 
 def ball(centre: Point, radius: float, colour: str, opacity: float = 1.0, sides: int = SIDES) -> Solid:

@@ -12,6 +12,7 @@ from lapwing.studies.view3d.bodies import LEVEL, Body, Link, Motion, Rotor, body
 from lapwing.studies.view3d.solids import THIN, Solid, ball, box, merge, raise_point, rod
 
 FRAME, MOTOR, LEG, FRONT, PAYLOAD, HULL = "#3A4149", "#14181C", "#6B757E", "#E69F00", "#B9834B", "#C3CAD1"
+MOTOR_SIDES, FOOT_SIDES = 14, 8
 DENSITY = 400.0  # [kg/m^3] density of a payload or load, which defines the size of its box
 GAP = 0.03  # [m] between arms and payload
 CARRIER_ARM, CARRIED_EDGE = 0.2, 0.12  # [m] for a cooperative load, whose scene has masses only
@@ -81,11 +82,13 @@ def _airframe(airframe: dict[str, Any], hubs: np.ndarray, origin: np.ndarray, ra
         solids.append(
             rod(centre, raise_point(hub, -0.4 * thick), 0.5 * thick, FRONT if is_front else FRAME, sides=THIN)
         )
-        solids.append(rod(raise_point(hub, -thick), raise_point(hub, 0.2 * thick), 0.14 * radius, MOTOR))
+        solids.append(
+            rod(raise_point(hub, -thick), raise_point(hub, 0.2 * thick), 0.14 * radius, MOTOR, sides=MOTOR_SIDES)
+        )
     for foot in np.array(airframe.get("contact", {}).get("feet", ())).reshape(-1, 3) - origin:
         top = centre + 0.75 * (np.array([foot[0], foot[1], centre[2]]) - centre)
         solids.append(rod(top, raise_point(foot, 0.3 * thick), 0.25 * thick, LEG, sides=THIN))
-        solids.append(ball(foot, 0.4 * thick, MOTOR, sides=THIN))
+        solids.append(ball(foot, 0.4 * thick, MOTOR, sides=FOOT_SIDES))
     payload = airframe.get("mass", {}).get("payload", 0.0)
     if payload > 0.0:
         edge = (payload / DENSITY) ** (1.0 / 3.0)
