@@ -36,6 +36,11 @@ def window_starts(flight: Recording, longest: int, stride: int, lowest: float = 
     return starts[count[starts + longest + 1] == count[starts - PAST]]
 
 
+def without_window(flight: Recording) -> str:
+    """Return the message on a flight in which `window_starts` finds no window."""
+    return f"{flight.name}: {' and '.join(flight.obstacles) or 'no valid window in the air'}"
+
+
 def predict(
     plant: PlantRows,
     flight: Recording,
