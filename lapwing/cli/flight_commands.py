@@ -23,6 +23,7 @@ MappingName = Annotated[
 TrimForce = Annotated[float, typer.Option(metavar="S", min=0.0, help="time constant of the force trim; 0: no trim")]
 TrimTorque = Annotated[float, typer.Option(metavar="S", min=0.0, help="time constant of the torque trim; 0: no trim")]
 FORCE_MEMORY, TORQUE_MEMORY = 0.15, 10.0  # [s] equal to `start_states.USUAL_TRIM`, which takes time to import
+UNUSED_MAPPING = "--mapping {}: {} needs none; leave out the option, which is for CSV files and logs of the Crazyflie"
 
 
 @app.command()
@@ -48,7 +49,7 @@ def validate(
     from lapwing.studies.validation.start_states import TrimMemory
 
     steps = _horizons(horizons)
-    _check_flights(flights)
+    _check_flights(flights, mapping)
     check_distinct({"--json": json, "--report": report})
     claim(json)
     claim_named("--report", report, ".html")
@@ -92,7 +93,7 @@ def identify(
     from lapwing.studies.terminal import console
     from lapwing.studies.validation.start_states import TrimMemory
 
-    _check_flights(flights)
+    _check_flights(flights, mapping)
     if out.suffix != ".toml":
         raise ValueError(f"--out {out}: expected a name that ends in .toml")
     if sensors:
@@ -126,8 +127,8 @@ def _fit_sensors(flights: list[Path], mapping: str | None, out: Path) -> None:
     from lapwing.studies.identification.sensor_fit import fit_all
     from lapwing.studies.identification.toml_tables import dump
 
-    tables, notes = fit_all([open_flight(path, mapping) for path in flights])
     claim(out)
+    tables, notes = fit_all([open_flight(path, mapping) for path in flights])
     names = ", ".join(path.name for path in flights)
     text = dump({"sensors": tables})
     write_text(out, f"# Sensors as estimated from {names}; put these tables into a scene.\n\n{text}")
@@ -153,7 +154,7 @@ def import_(
     logs of the Crazyflie's uSD deck, and CSV files (.csv, .csv.gz) with --mapping.
     """
     from lapwing.studies.flight_import.log_flight import is_log
-    from lapwing.studies.flight_import.open_flight import open_flight
+    from lapwing.studies.flight_import.open_flight import open_flight, takes_mapping
     from lapwing.studies.flight_import.write_log import write_log
 
     check_distinct({"FLIGHT": flight, "--out": out})
@@ -162,6 +163,8 @@ def import_(
     if flight.suffix == ".mcap" and flight.is_file() and is_log(flight):
         raise ValueError(f"{flight}: is a Lapwing log already; use it without import, e.g. lapwing report {flight}")
     recording = open_flight(flight, mapping, vehicle)
+    if mapping is not None and not takes_mapping(flight):
+        raise ValueError(UNUSED_MAPPING.format(mapping, flight))
     if not recording.valid.any():
         raise ValueError(f"{flight}: no valid sample; check the --mapping")
     check_log(out)
@@ -186,7 +189,11 @@ def _horizons(text: str) -> tuple[int, ...]:
     return steps
 
 
-def _check_flights(flights: list[Path]) -> None:
+def _check_flights(flights: list[Path], mapping: str | None) -> None:
+    from lapwing.studies.flight_import.open_flight import takes_mapping
+
     for path in flights:
         if not path.exists():
             raise ValueError(f"{path}: no such file; use the path of a recorded flight")
+    if mapping is not None and not any(map(takes_mapping, flights)):
+        raise ValueError(UNUSED_MAPPING.format(mapping, flights[0]))

@@ -18,6 +18,9 @@ from lapwing.cli.output_paths import check_log
 if TYPE_CHECKING:
     from lapwing.services.mavlink.link_server import LinkServer
 
+ENDPOINT = "tcp/127.0.0.1:7447"
+ENDPOINT_ROS2 = "tcp/127.0.0.1:7448"  # the Zenoh router of a ROS 2 domain has port 7447
+
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayOptions(LinkOptions):
@@ -32,9 +35,12 @@ class ReplayOptions(LinkOptions):
         str | None, typer.Option(metavar="TOPIC,...", help="play only these topics, e.g. /clock,/drone1/imu")
     ] = None
     key_prefix: KeyPrefix = "lapwing"
-    listen: Annotated[str, typer.Option(metavar="ENDPOINT", help="endpoint at which subscribers connect")] = (
-        "tcp/127.0.0.1:7447"
-    )
+    listen: Annotated[
+        str | None,
+        typer.Option(
+            metavar="ENDPOINT", help=f"endpoint at which subscribers connect [{ENDPOINT}; with --ros2 {ENDPOINT_ROS2}]"
+        ),
+    ] = None
     record: Annotated[Path | None, typer.Option(metavar="FILE", help="write the published messages to a log")] = None
 
     def validate(self) -> None:
@@ -47,8 +53,13 @@ class ReplayOptions(LinkOptions):
         if self.record and self.record.resolve() == self.log.resolve():
             raise ValueError(f"--record {self.record}: is the replayed log; choose another file")
         check_log(self.record)
-        check_published("--listen", self.listen, self.insecure)
+        check_published("--listen", self.endpoint, self.insecure)
         self.validate_links()
+
+    @property
+    def endpoint(self) -> str:
+        """Endpoint at which subscribers connect."""
+        return self.listen or (ENDPOINT if self.ros2 is None else ENDPOINT_ROS2)
 
 
 @app.command()
@@ -84,7 +95,7 @@ def replay(options: ReplayOptions) -> None:
         count = play(
             log,
             options.key_prefix,
-            options.listen,
+            options.endpoint,
             cut,
             factor,
             options.loop,

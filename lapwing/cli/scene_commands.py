@@ -8,7 +8,7 @@ import typer
 
 from lapwing.cli.app import app
 from lapwing.cli.options import Overrides
-from lapwing.cli.output_paths import claim
+from lapwing.cli.output_paths import check_distinct, claim
 from lapwing.cli.preflight import warn_of_gains, warn_of_round_off, with_solver_selected
 
 if TYPE_CHECKING:
@@ -184,7 +184,7 @@ def _scenes_of(path: Path) -> list[Path]:
 
 @app.command()
 def parameters(
-    file: Annotated[Path, typer.Argument(metavar="FILE", help="scene, or MCAP log of a run")],
+    file: Annotated[Path, typer.Argument(metavar="FILE", help="scene (name or TOML file), or MCAP log of a run")],
     save: Annotated[
         Path | None, typer.Option(metavar="FILE", help="write a QGroundControl parameter file, which a scene can use")
     ] = None,
@@ -196,8 +196,10 @@ def parameters(
     from lapwing.services.common.autopilot_parameters import apply_commands
     from lapwing.services.scene_resolver import resolve
 
+    check_distinct({"FILE": file, "--save": save})
+    claim(save)
     commands: list = []
-    if file.suffix == ".toml":
+    if file.suffix != ".mcap":
         setup = resolve(with_solver_selected(file, []))
     else:
         with LogReader(file) as read:

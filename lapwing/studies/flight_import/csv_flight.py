@@ -87,7 +87,7 @@ def from_columns(path: Path, table: dict[str, np.ndarray], mapping: Mapping) -> 
     faults = {cause: int(mask.sum()) for cause, mask in invalid.items() if mask.any()}
     valid = ~widen(np.logical_or.reduce(list(invalid.values())), NEIGHBOURS)
     interval = float(np.round(np.median(np.diff(time)), 5))
-    notes = [f"no {key}: the flight cannot be validated" for key in ("position", "attitude") if key not in measured]
+    notes = []
     if "attitude" in measured:
         check_rate_unit(path, attitude_rate, omega, valid)
         notes.append(describe(attitude_rate, omega, valid, interval))

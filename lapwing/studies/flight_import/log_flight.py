@@ -9,10 +9,11 @@ from lapwing.cosim.log.log_reader import LogReader
 from lapwing.cosim.log.mcap_contents import UnchunkedError
 from lapwing.messages.topics import ACTUATORS, BARO, GPS, IMU, MAG, SETPOINT, TRUTH
 from lapwing.studies.flight_data import FlightData
-from lapwing.studies.flight_import.recording import SETPOINT_WIDTH, Recording, Series
+from lapwing.studies.flight_import.recording import LONGEST_GAP, SETPOINT_WIDTH, Recording, Series
 from lapwing.studies.rotation_arrays import continuous, unit
 
 RATE = 100.0  # [Hz] of the recording
+ROUNDING = 1e-6  # [samples] error of a time, so that the last message counts
 READINGS = {  # name without the vehicle's, and fields, of each sensor's topic
     "imu": ("imu", ("angular_velocity", "linear_acceleration")),
     "gps": ("gps/fix", ("latitude", "longitude", "altitude")),
@@ -44,7 +45,7 @@ def read_log_flight(path: Path) -> Recording:
     interval = 1.0 / RATE
     if len(times) < 2 or times[-1] - times[0] < 50 * interval:
         raise ValueError(f"{path}: shorter than {50 * interval:g} s; expected a flight")
-    grid = np.arange(times[0], times[-1], interval)
+    grid = times[0] + interval * np.arange(int((times[-1] - times[0]) / interval + ROUNDING) + 1)
     volts = _latest(grid, flight.times("actuators"), flight.actuators.motor_voltage)
     omega, force = _sample(grid, times, truth.angular_velocity), np.full((len(grid), 3), np.nan)
     if flight.has("imu") and len(flight.topic("imu")) > 1:
@@ -54,11 +55,22 @@ def read_log_flight(path: Path) -> Recording:
     battery = np.full(len(grid), np.nan)
     position, velocity = _sample(grid, times, truth.position), _sample(grid, times, truth.velocity)
     measured = [v for v in (position, velocity, quaternion) if np.isfinite(v).any()]
-    valid = np.isfinite(np.column_stack([*measured, omega, volts])).all(axis=1)
+    valid = np.isfinite(np.column_stack([*measured, omega, volts])).all(axis=1) & ~_in_gap(grid, times)
     return Recording(
         path.stem, interval, position, quaternion, velocity, omega, force, volts, battery, valid,
         power=_power(grid, times, truth), setpoint=_setpoint(grid, flight), readings=_readings(flight, times[0]),
     )  # fmt: skip
+
+
+def _in_gap(grid: np.ndarray, times: np.ndarray) -> np.ndarray:
+    """Return True for times [s] of the grid between two messages that are too far apart, shape (len(grid),).
+
+    An imported log leaves out invalid samples. Interpolation must not replace them. A log may have a low rate.
+    """
+    steps = np.diff(times)
+    right = np.clip(np.searchsorted(times, grid - ROUNDING / RATE), 1, len(times) - 1)
+    is_message = np.minimum(np.abs(times[right] - grid), np.abs(times[right - 1] - grid)) < ROUNDING / RATE
+    return np.asarray(~is_message & (steps[right - 1] > max(LONGEST_GAP, 1.5 * float(np.median(steps)))))
 
 
 def _power(grid: np.ndarray, times: np.ndarray, truth: Any) -> np.ndarray:

@@ -7,13 +7,14 @@ from lapwing.studies.flight_import.column_mapping import load_mapping
 from lapwing.studies.flight_import.recording import Recording
 
 USD_MAPPING = "crazyflie_usd"
+CSV = (".csv", ".csv.gz")
 FORMATS = (
     ".ulg, .bin, .log, .tlog, .mcap, .db3, a rosbag2 folder, .csv and .csv.gz with --mapping, or a log of the Crazyflie"
 )
 
 
 def open_flight(path: Path, mapping: str | None = None, vehicle: str | None = None) -> Recording:
-    """Read a flight, and note if it never leaves the ground. The file name's extension selects one of `FORMATS`.
+    """Read a flight, and note why it cannot be validated. The file name's extension selects one of `FORMATS`.
 
     Args:
         path: path of the file, or of the folder or a single file of a rosbag2.
@@ -24,10 +25,15 @@ def open_flight(path: Path, mapping: str | None = None, vehicle: str | None = No
         ValueError: the format is unknown, a CSV file has no mapping, or the file is invalid.
     """
     flight = _read(path, mapping, vehicle)
-    if reason := flight.grounded:
-        note = f"never leaves the ground, {reason}: the flight cannot be validated"
-        return replace(flight, notes=(*flight.notes, note))
-    return flight
+    notes = (f"{reason}: the flight cannot be validated" for reason in flight.obstacles)
+    return replace(flight, notes=(*flight.notes, *notes))
+
+
+def takes_mapping(path: Path) -> bool:
+    """Return True for files whose columns a mapping names: CSV files and logs of the Crazyflie."""
+    from lapwing.studies.flight_import.usd_log import is_usd_log
+
+    return path.name.endswith(CSV) or (path.is_file() and is_usd_log(path))
 
 
 def _read(path: Path, mapping: str | None, vehicle: str | None) -> Recording:
@@ -42,7 +48,7 @@ def _read(path: Path, mapping: str | None, vehicle: str | None) -> Recording:
     if not path.is_file():
         message = "is not a regular file" if path.exists() else "no such file"
         raise ValueError(f"{path}: {message}; use the path of a recorded flight")
-    if path.name.endswith((".csv", ".csv.gz")):
+    if path.name.endswith(CSV):
         if mapping is None:
             raise ValueError(
                 f"{path}: a CSV file needs --mapping; use the name of an included mapping, or a .toml file"

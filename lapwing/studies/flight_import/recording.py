@@ -144,21 +144,26 @@ class Recording:
         return int(self.motor_voltage.shape[1])
 
     def repeats(self, other: Self) -> bool:
-        """Return True if the measurements equal those of another recording, also if its file has another format."""
-        return len(self) == len(other) and all(
-            np.allclose(own, others, rtol=0.0, atol=1e-9, equal_nan=True)
+        """Return True if the valid measurements equal those of another recording, also of a file in another format."""
+        if len(self) != len(other):
+            return False
+        valid = self.valid & other.valid
+        return bool(valid.any()) and all(
+            np.allclose(own[valid], others[valid], rtol=0.0, atol=1e-9, equal_nan=True)
             for own, others in ((self.omega, other.omega), (self.position, other.position))
         )
 
     @property
-    def grounded(self) -> str:
-        """Reason why the vehicle cannot have left the ground, or ""."""
-        if not np.nanmax(self.motor_voltage, initial=0.0) > 0.0:
-            return "the motors do not run"
+    def obstacles(self) -> list[str]:
+        """Reasons why no part of the flight can be validated."""
+        unmeasured = [name for name in ("position", "attitude") if not np.isfinite(getattr(self, name)).any()]
+        reasons = [f"no {name}" for name in unmeasured]
         height = self.position[self.valid & np.isfinite(self.position[:, 2]), 2]
-        if len(height) and height.max() < LOWEST and np.ptp(height) < LOWEST:
-            return f"the height changes by {np.ptp(height):.2f} m"
-        return ""
+        if not np.nanmax(self.motor_voltage, initial=0.0) > 0.0:
+            reasons.append("never leaves the ground, the motors do not run")
+        elif len(height) and height.max() < LOWEST and np.ptp(height) < LOWEST:
+            reasons.append(f"never leaves the ground, the height changes by {np.ptp(height):.2f} m")
+        return reasons
 
 
 def widen(invalid: np.ndarray, samples: int) -> np.ndarray:

@@ -22,9 +22,9 @@ from lapwing.studies.identification.output_error import HORIZONS, Fit, OutputErr
 from lapwing.studies.identification.toml_tables import dump
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.prediction_metrics import magnitudes, pool_flights
-from lapwing.studies.validation.procedure import read_flights
+from lapwing.studies.validation.procedure import USABLE, read_flights
 from lapwing.studies.validation.start_states import TrimMemory, start_states
-from lapwing.studies.validation.windows import compare, predict, window_starts
+from lapwing.studies.validation.windows import compare, predict, window_starts, without_window
 
 HELD_OUT = 0.2  # share of the flights that are not used for estimation
 HORIZON = (50,)  # samples after which held-out flights are compared
@@ -81,11 +81,10 @@ def identify(
     flights, skipped = read_flights(paths, mapping, report)
     airborne = [len(window_starts(r, HORIZON[-1], 1)) > 0 for r in flights]
     recordings = list(compress(flights, airborne))
-    skipped += [
-        f"{r.name}: no valid window in the air" for r, flies in zip(flights, airborne, strict=True) if not flies
-    ]
+    unused = [without_window(r) for r, flies in zip(flights, airborne, strict=True) if not flies]
     if not recordings:
-        raise ValueError("no flight has a valid window in the air; use flights that leave the ground")
+        raise ValueError(f"{unused[0]}; {USABLE}")
+    skipped += unused
     test_indices = _held_out(len(recordings), seed)
     used = [r for k, r in enumerate(recordings) if k not in test_indices]
     held_out = [r for k, r in enumerate(recordings) if k in test_indices]

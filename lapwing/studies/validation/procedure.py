@@ -15,8 +15,9 @@ from lapwing.studies.validation.linear_baseline import linear_fit
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.prediction_metrics import FIELDS, Metric, constant_velocity, magnitudes, pool_flights
 from lapwing.studies.validation.start_states import USUAL_TRIM, StartStates, TrimMemory, start_states
-from lapwing.studies.validation.windows import Errors, compare, predict, thrust_ratio, window_starts
+from lapwing.studies.validation.windows import Errors, compare, predict, thrust_ratio, window_starts, without_window
 
+USABLE = "use flights with position and attitude that leave the ground"
 STRIDE = 5  # samples between the starts of two windows
 SAME_VEHICLE = 0.25  # largest difference of the thrust ratio from 1; 0.12 in 44 flights of one Crazyflie
 
@@ -91,16 +92,17 @@ def validate(
     """
     recordings, skipped = read_flights(paths, mapping, report)
     interval = recordings[0].interval
-    used, starts = [], []
+    used, starts, unused = [], [], []
     for recording in recordings:
         result = window_starts(recording, horizons[-1], stride)
         if len(result):
             used.append(recording)
             starts.append(result)
         else:
-            skipped.append(f"{recording.name}: no valid window in the air")
+            unused.append(without_window(recording))
     if not used:
-        raise ValueError(f"{skipped[0]}; use flights that leave the ground")
+        raise ValueError(f"{unused[0]}; {USABLE}")
+    skipped += unused
     plant = PlantRows(scene, interval, overrides)
     for recording in used:
         if recording.rotors != plant.rotors:

@@ -38,6 +38,11 @@ def window_starts(flight: Recording, longest: int, stride: int, lowest: float = 
     return starts[count[starts + longest + 1] == count[starts - PAST]]
 
 
+def without_window(flight: Recording) -> str:
+    """Return the message on a flight in which `window_starts` finds no window."""
+    return f"{flight.name}: {' and '.join(flight.obstacles) or 'no valid window in the air'}"
+
+
 def thrust_ratio(flight: Recording, starts: np.ndarray, states: StartStates) -> float:
     """Return the ratio of predicted to measured specific force along body z, of their medians over the windows.
 

@@ -80,3 +80,21 @@ def test_scene_without_autopilot_has_no_parameters(tmp_path):
     result = lapwing("parameters", "lapwing/scenes/os4_motors.toml")
     assert (result.returncode, result.stderr.count("\n")) == (2, 1)
     assert "no autopilot" in result.stderr
+
+
+@pytest.mark.long
+def test_command_takes_name_of_shipped_scene(tmp_path):
+    saved = tmp_path / "hover.params"
+    result = lapwing("parameters", "hover", "--save", saved)
+    assert (result.returncode, result.stderr) == (0, "")
+    assert read(saved) == {name: p.default for name, p in table(load(HOVER)).items()}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("file", "message"), [("hovr", "unknown scene 'hovr'"), ("missing.mcap", "cannot read the log")]
+)
+def test_command_rejects_missing_scene_or_log_in_one_line(file, message):
+    result = lapwing("parameters", file)
+    assert (result.returncode, result.stderr.count("\n")) == (2, 1)
+    assert message in result.stderr

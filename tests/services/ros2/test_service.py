@@ -304,6 +304,22 @@ def test_replay_appears_in_ros_graph(tmp_path, port):
     assert result[1] in sent
 
 
+@pytest.mark.long
+def test_replay_joins_ros_graph_with_default_endpoints(tmp_path):
+    for number in (7447, 7448):
+        with socket.socket() as probe:
+            if probe.connect_ex(("127.0.0.1", number)) == 0:
+                pytest.skip(f"another program listens at port {number}")
+    log = tmp_path / "flight.mcap"
+    with LogWriter(log, {}, {}) as writer:
+        for k in range(5):
+            writer.write("/clock", Clock, Clock(stamp(k)).encode(), k * 4_000_000)
+    words = [sys.executable, "-m", "lapwing", "replay", str(log), "--speed", "max", "--ros2", str(DOMAIN)]
+    done = subprocess.run(words, capture_output=True, text=True, timeout=120, check=False)
+    assert (done.returncode, done.stderr) == (0, "")
+    assert "5 messages published" in done.stdout
+
+
 def test_missing_router_is_reported(port):
     with (
         socket.create_server(("127.0.0.1", port)),

@@ -152,3 +152,55 @@ def test_failed_import_keeps_former_log(tmp_path, flight, monkeypatch):
         write_log(out, flight, "f.bin")
     assert [path.name for path in tmp_path.iterdir()] == ["out.mcap"]
     assert out.read_bytes() == b"former"
+
+
+@pytest.mark.long
+def test_log_of_imported_flight_repeats_it_and_keeps_its_gaps(flight, tmp_path):
+    broken_flight = replace(flight, omega=flight.omega.copy())
+    broken_flight.omega[150] = 60.0  # [rad/s] above the range of a gyroscope
+    source, out = write_csv(tmp_path / "flight.csv", broken_flight), tmp_path / "imported.mcap"
+    done = run("import", source, "--mapping", "nanobench", "--out", out)
+    assert done.returncode == 0, done.stderr
+    original, imported = open_flight(source, "nanobench"), open_flight(out)
+    assert 0 < (~original.valid).sum() < 10
+    assert (imported.valid == original.valid).all()
+    assert imported.repeats(original)
+    assert original.repeats(imported)
+    done = run("validate", "crazyflie_21", out, source, "--mapping", "nanobench")
+    assert done.returncode == 0, done.stderr
+    assert "flight: the same flight as imported" in done.stdout
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("command", ["import", "validate", "identify"])
+def test_mapping_that_no_file_uses_is_rejected(flight, tmp_path, command):
+    log = tmp_path / "flight.bin"
+    log.write_bytes(dataflash().seeds[0])
+    arguments = {
+        "import": (log, "--out", tmp_path / "out.mcap"),
+        "validate": ("crazyflie_21", log),
+        "identify": ("crazyflie_21", log, "--out", tmp_path / "out.toml", "--free", "airframe.mass.total"),
+    }
+    done = run(command, *arguments[command], "--mapping", "nanobench")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert f"--mapping nanobench: {log} needs none" in done.stderr
+    assert [path.name for path in tmp_path.iterdir()] == ["flight.bin"]
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    "command", [("validate", "crazyflie_21"), ("identify", "crazyflie_21", "--free", "airframe.mass.total")]
+)
+def test_flight_without_position_is_named_as_such(flight, tmp_path, command):
+    write_log(tmp_path / "a.mcap", replace(flight, position=np.full_like(flight.position, np.nan)), "a.csv")
+    more = ("--out", tmp_path / "a.toml") if command[0] == "identify" else ()
+    done = run(*command, tmp_path / "a.mcap", *more)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "a: no position; use flights with position and attitude" in done.stderr
+
+
+@pytest.mark.long
+def test_sensor_fit_checks_output_first(flight, tmp_path):
+    done = run("identify", "crazyflie_21", tmp_path, "--sensors", "--out", tmp_path / "none" / "a.toml")
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "there is no folder" in done.stderr

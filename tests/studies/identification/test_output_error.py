@@ -112,7 +112,7 @@ def test_command_writes_airframe_with_provenance(plant, tmp_path):
     assert "Identified by output error from 2 flights" in out.read_text()
     assert len(json.loads(figures.read_text())["held_out"]) == 1
     assert f"left out: copy: the same flight as {recordings[0].name}" in done.stdout
-    assert "left out: grounded: no valid window in the air" in done.stdout
+    assert "left out: grounded: never leaves the ground, the height changes by 0.00 m" in done.stdout
     assert not out.with_name("mine.toml.progress").exists()
 
 
