@@ -574,6 +574,7 @@ def test_fleet_is_drawn_in_few_calls_and_only_on_change(tmp_path):
             const frames = lapwingView.frames() - begin, seconds = (performance.now() - start) / 1000;
             lapwingView.seek(3.0);
             await until(() => Math.abs(lapwingView.camera().target[1] - 3.0) < 0.05);
+            await until(() => Math.abs(ends()[0][3] - 3.0) < 0.01);
             return [calls, [...early, ...ends()], names.length, frames, seconds, lapwingView.frames() - begin - frames];
             """
         )

@@ -113,6 +113,12 @@ def test_form_shows_units_ranges_and_help(studio):
     assert "`" not in text
 
 
+def test_titles_of_scenes_show_code_without_backticks(studio):
+    text = studio.page("")
+    assert "for <code>lapwing tune --from</code>" in text
+    assert "`" not in text
+
+
 def test_search_finds_scenes_by_title(studio):
     text = studio.page("?q=laser+rangefinder")
     assert "scenes/bridge" in text
