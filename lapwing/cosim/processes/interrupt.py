@@ -21,7 +21,7 @@ class Interrupted(BaseException):
 def interrupt_behind(error: BaseException) -> Interrupted | None:
     """Return the interrupt that caused an error, or None.
 
-    Python 3.11 raises RuntimeError from an exception in `__set_name__`, which every dataclass calls while it is defined.
+    Python 3.11 raises RuntimeError from an exception in `__set_name__`, which every dataclass calls at its definition.
     """
     cause: BaseException | None = error
     while cause is not None and not isinstance(cause, Interrupted):
