@@ -22,9 +22,9 @@ def main() -> None:
         except Interrupted as interrupted:
             raise SystemExit(report_interrupt(interrupted)) from None
         except Exception as error:
-            if (interrupted := interrupt_behind(error)) is None:
+            if (cause := interrupt_behind(error)) is None:
                 raise
-            raise SystemExit(report_interrupt(interrupted)) from None
+            raise SystemExit(report_interrupt(cause)) from None
     except KeyboardInterrupt:  # Python raises it for SIGINT before `raise_on_interrupt`
         from lapwing.cosim.processes.interrupt import SIGINT, Interrupted, report_interrupt
 
