@@ -6,7 +6,12 @@ FILES = (("stdin", "r"), ("stdout", "w"), ("stderr", "w"))  # file descriptors
 def main() -> None:
     """Run the command `lapwing`."""
     try:
-        from lapwing.cosim.processes.interrupt import Interrupted, raise_on_interrupt, report_interrupt
+        from lapwing.cosim.processes.interrupt import (
+            Interrupted,
+            interrupt_behind,
+            raise_on_interrupt,
+            report_interrupt,
+        )
 
         try:
             raise_on_interrupt()
@@ -16,6 +21,10 @@ def main() -> None:
             carry_out()
         except Interrupted as interrupted:
             raise SystemExit(report_interrupt(interrupted)) from None
+        except Exception as error:
+            if (cause := interrupt_behind(error)) is None:
+                raise
+            raise SystemExit(report_interrupt(cause)) from None
     except KeyboardInterrupt:  # Python raises it for SIGINT before `raise_on_interrupt`
         from lapwing.cosim.processes.interrupt import SIGINT, Interrupted, report_interrupt
 

@@ -53,6 +53,9 @@ def files(plans: list[str], loaded: "Scene") -> dict[str, Path]:
         name, equals, path = text.partition("=")
         if not equals or name not in names or name in result:
             expected = f"NAME=FILE, a plan for each of {', '.join(names)} that flies one"
-            raise ValueError(f"--plan {text}: the scene has several vehicles; expected {expected}")
+            fault = "the scene has several vehicles"
+            if equals:
+                fault = f"{name} has a plan already" if name in result else f"the scene has no vehicle {name}"
+            raise ValueError(f"--plan {text}: {fault}; expected {expected}")
         result[name] = Path(path)
     return result

@@ -86,8 +86,11 @@ class FlightData(FlightTracking):
             names = [name for name, kind in log.topics().items() if kind in TYPES]
             fleet = _vehicles(names, log.metadata)
             selected = vehicle or next(iter(fleet), None)
-            if selected is None or selected not in fleet:
-                raise ValueError(f"{path}: no flight in this log (no topic /{selected or 'NAME'}/ground_truth)")
+            if selected is None:
+                raise ValueError(f"{path}: no flight in this log (no topic /NAME/ground_truth)")
+            if selected not in fleet:
+                expected = f"one of {', '.join(fleet)}" if fleet else "a log of a flight"
+                raise ValueError(f"{path}: no flight in this log of a vehicle {selected}; expected {expected}")
             others = {topic.key(name) for name in fleet for topic in FLEET_TOPICS}
             own = [name for name in names if name.startswith(f"/{selected}/") or "/" not in name[1:] or name in others]
             return cls._of_log(log, str(path), log.histories(_select_names(own, only, fleet)), selected, fleet)

@@ -53,6 +53,10 @@ def test_report_shows_all_paths(flown):
     page = folder / "scout.html"
     command("report", folder / "a.mcap", "--vehicle", "scout", "--out", page)
     assert "quad_x" in page_text(page)
+    words = [sys.executable, "-m", "lapwing", "report", str(folder / "a.mcap"), "--vehicle", "nobody"]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
+    assert "vehicle nobody; expected one of left, right, scout" in done.stderr
 
 
 def test_info_verify_and_resimulate_accept_log_of_fleet(flown):

@@ -65,3 +65,25 @@ entry_point.main()
 def test_object_of_interrupted_constructor_is_silent():
     done = subprocess.run([sys.executable, "-c", HALF_MADE], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "lapwing: ended by SIGINT\n")
+
+
+IN_CLASS = """
+import os, signal
+from lapwing.cli import entry_point
+
+class Name:
+    def __set_name__(self, owner, name):  # Python 3.11 raises RuntimeError from its exceptions
+        os.kill(os.getpid(), signal.SIGINT)
+
+def define():
+    class Table:
+        name = Name()
+
+entry_point.prepare_streams = define
+entry_point.main()
+"""
+
+
+def test_interrupt_in_class_definition_has_line_and_exit_code():
+    done = subprocess.run([sys.executable, "-c", IN_CLASS], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "lapwing: ended by SIGINT\n")

@@ -32,9 +32,16 @@ def test_named_vehicles_of_fleet_are_operated():
     ]
 
 
-@pytest.mark.parametrize("inputs", [[PLAN], [f"nobody={PLAN}"], [f"left={PLAN}", f"left={PLAN}"]])
-def test_plan_of_unknown_vehicle_is_rejected(inputs):
-    with pytest.raises(ValueError, match=r"the scene has several vehicles; expected NAME=FILE, .*left, right, scout"):
+@pytest.mark.parametrize(
+    ("inputs", "message"),
+    [
+        ([PLAN], "the scene has several vehicles"),
+        ([f"nobody={PLAN}"], "the scene has no vehicle nobody"),
+        ([f"left={PLAN}", f"left={PLAN}"], "left has a plan already"),
+    ],
+)
+def test_plan_of_unknown_vehicle_is_rejected(inputs, message):
+    with pytest.raises(ValueError, match=rf"{message}; expected NAME=FILE, .*left, right, scout"):
         plan_options.files(inputs, load("fleet"))
 
 

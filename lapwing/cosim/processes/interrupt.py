@@ -18,6 +18,17 @@ class Interrupted(BaseException):
         self.signal = number
 
 
+def interrupt_behind(error: BaseException) -> Interrupted | None:
+    """Return the interrupt that caused an error, or None.
+
+    Python 3.11 raises RuntimeError from an exception in `__set_name__`, which every dataclass calls at its definition.
+    """
+    cause: BaseException | None = error
+    while cause is not None and not isinstance(cause, Interrupted):
+        cause = cause.__cause__ or cause.__context__
+    return cause
+
+
 class Stop:
     """Context in which the signals of `ENDING` are stored instead of raised."""
 
