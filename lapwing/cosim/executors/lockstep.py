@@ -155,7 +155,8 @@ def pin(core: int) -> None:
     """
     if hasattr(os, "sched_setaffinity"):
         for thread in os.listdir("/proc/self/task"):
-            os.sched_setaffinity(int(thread), {core})
+            with suppress(OSError):  # the thread has ended, or a sandbox does not permit it
+                os.sched_setaffinity(int(thread), {core})
 
 
 def batch() -> None:
