@@ -4,6 +4,7 @@ from typing import NamedTuple
 
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.vector import ZERO
+from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.autopilot.estimator.filter_state import Inertial, Nominal, State, new_memory
 
 
@@ -14,8 +15,8 @@ class NavigationState(NamedTuple):
     filter: State  # undefined before the start
 
 
-def blank() -> NavigationState:
+def blank(p: Estimator) -> NavigationState:
     """Return the state before the first reading."""
     nominal = Nominal(NO_ROTATION, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, 0.0)
     inertial = Inertial(0, ZERO, ZERO, ZERO, ZERO, ZERO, False, 0)
-    return NavigationState(False, State(nominal, inertial, new_memory()))
+    return NavigationState(False, State(nominal, inertial, new_memory(p)))
