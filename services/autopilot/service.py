@@ -116,7 +116,7 @@ def _navigation(
     if p is None:
         inputs = (InputPort(ports.TRUTH), battery, flight)
         return [Block(f"{NAME}.estimate", TrueEstimate(wakeup), Cell(0.0), inputs, (estimate,))]
-    state = Cell(blank(p))
+    state = Cell(blank())
     height_reference = next(q.default for q in config.parameters if q.name == "EKF2_HGT_REF")
     over_ground = GroundReference(p._replace(sonar_height_max=math.inf))
     known_ports = setup.ports

@@ -9,7 +9,6 @@ from lapwing.kernels import always_inline
 from lapwing.kernels.simd import load, pack4, store, unpack4
 from lapwing.services.autopilot.estimator.filter_state import (
     ACCELEROMETER,
-    CALM,
     CONSIDERED,
     GYRO,
     GYRO_SCALE,
@@ -20,10 +19,11 @@ from lapwing.services.autopilot.estimator.filter_state import (
     VARIANCE,
     VELOCITY,
     WANDER,
+    WIND_SQUARES,
     Memory,
-    considers_wind,
     three,
 )
+from lapwing.services.autopilot.estimator.static_pressure import considers_wind
 
 
 @always_inline
@@ -130,9 +130,9 @@ def propagate_considered(m: Memory, omega: Vec3, f: Vec3, r: Mat3, dt: float) ->
     Call after `propagate_covariance`; `omega` is the rate [rad/s], f the specific force [m/s^2] in the world.
     """
     c, k = m.covariance, m.considered
-    _transform_rows(k, CONSIDERED, 0, CALM, f, r, dt)
+    _transform_rows(k, CONSIDERED, 0, WIND_SQUARES, f, r, dt)
     if considers_wind(m):
-        _transform_rows(k, CONSIDERED, CALM, CONSIDERED, f, r, dt)
+        _transform_rows(k, CONSIDERED, WIND_SQUARES, CONSIDERED, f, r, dt)
     turns, lifts = _turns(omega, r, dt), _lifts(f, r, dt)
     _add_half(m, THETA, GYRO_SCALE, turns)
     _add_half(m, VELOCITY, LIFT, lifts)
@@ -164,7 +164,5 @@ def fade(m: Memory, keep: float) -> None:
             store(c, SIZE * i + j, keep * load(c, SIZE * i + j))
         for j in range(SIZE):
             c[j, i] *= keep
-        for j in range(0, CALM, 4):
+        for j in range(0, CONSIDERED, 4):
             store(m.considered, CONSIDERED * i + j, keep * load(m.considered, CONSIDERED * i + j))
-        if considers_wind(m):
-            store(m.considered, CONSIDERED * i + CALM, keep * load(m.considered, CONSIDERED * i + CALM))

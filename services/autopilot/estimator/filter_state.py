@@ -19,7 +19,6 @@ HEADING, BAROMETER, SCALE = 21, 22, 23
 CONSIDERED = 20  # errors of instruments that are considered and not estimated (theory.md, eqs. (3.60) and (3.67))
 GYRO_SCALE, GYRO_ALIGNMENT, MAG_SCALE, MAG_ALIGNMENT, LIFT = 0, 3, 6, 9, 11  # LIFT: accelerometers, eq. (3.66)
 WIND, WIND_SQUARES, GUST = 14, 16, 18  # static pressure error, eq. (3.67); column 19 is empty
-CALM = WIND_SQUARES  # columns in use without the static pressure error: loads of four columns, WIND is zero
 # Rows of `considered`: variances, row of H, covariance with the innovation
 VARIANCE, ROW, PRODUCT = SIZE, SIZE + 1, SIZE + 2
 
@@ -78,7 +77,6 @@ class Memory(NamedTuple):
     trend: np.ndarray  # (2, 2) of horizontal innovations of GPS position and velocity (theory.md, eq. (3.64))
     nis: np.ndarray  # (WATCHED,) last normalised innovation squared of each source
     packed: np.ndarray  # (1, PACKED) upper triangle of the covariance and `nis`, as published
-    wind: bool | None  # True: with columns of `considered` for wind; None: kernels are compiled without them
 
 
 class State(NamedTuple):
@@ -103,19 +101,8 @@ def attitude_from_gravity(p: Estimator, specific_force_body: Vec3, field_body: V
     return from_matrix((east[0], east[1], east[2], north[0], north[1], north[2], up[0], up[1], up[2]))
 
 
-def expects_wind(p: Estimator) -> bool:
-    """Return True if the filter considers the static pressure error of the barometer by wind."""
-    return p.static_pressure_error != NO_STATIC_PRESSURE_ERROR and p.wind_speed > 0.0
-
-
-@always_inline
-def considers_wind(m: Memory) -> bool:
-    """Return True if `considered` has columns for wind; decided by type, so that code for them is left out if not."""
-    return m.wind is not None
-
-
-def new_memory(p: Estimator) -> Memory:
-    """Return the arrays of a state; their types depend on `expects_wind`."""
+def new_memory() -> Memory:
+    """Return the arrays of a state."""
     return Memory(
         np.zeros((SIZE, SIZE)),
         np.zeros(SIZE),
@@ -130,7 +117,6 @@ def new_memory(p: Estimator) -> Memory:
         np.zeros((2, 2)),
         np.zeros(WATCHED),
         np.zeros((1, PACKED)),
-        True if expects_wind(p) else None,
     )
 
 
@@ -173,7 +159,7 @@ def initial(p: Estimator, m: Memory, position_world: Vec3, specific_force_body: 
     alignment = p.accelerometer_alignment_std * p.accelerometer_alignment_std
     m.considered[VARIANCE, LIFT : LIFT + 2] = alignment
     m.considered[VARIANCE, LIFT + 2] = p.accelerometer_scale_std * p.accelerometer_scale_std
-    if considers_wind(m):
+    if p.static_pressure_error != NO_STATIC_PRESSURE_ERROR and p.wind_speed > 0.0:
         square = p.wind_speed * p.wind_speed
         m.considered[VARIANCE, WIND : WIND + 2] = 0.5 * square
         m.considered[VARIANCE, WIND_SQUARES : WIND_SQUARES + 2] = 0.5 * square * square

@@ -9,7 +9,6 @@ from lapwing.kernels import always_inline, kernel, noinline
 from lapwing.kernels.simd import load, splat, store
 from lapwing.services.autopilot.estimator.filter_state import (
     ACCELEROMETER,
-    CALM,
     CONSIDERED,
     LIFT,
     PRODUCT,
@@ -17,10 +16,9 @@ from lapwing.services.autopilot.estimator.filter_state import (
     SIZE,
     THETA,
     VARIANCE,
-    WIND,
     Memory,
-    considers_wind,
 )
+from lapwing.services.autopilot.estimator.static_pressure import considers_wind
 
 FLOOR = 1e-8  # minimum measurement variance, which keeps S well above round-off with ideal instruments
 
@@ -30,10 +28,8 @@ def clear(m: Memory) -> None:
     """Clear the row of the error and of the considered parameters."""
     for i in range(0, SIZE, 4):
         store(m.row, i, splat(0.0))
-    for k in range(0, CALM, 4):
+    for k in range(0, CONSIDERED, 4):
         store(m.considered, CONSIDERED * ROW + k, splat(0.0))
-    if considers_wind(m):
-        store(m.considered, CONSIDERED * ROW + CALM, splat(0.0))
 
 
 @noinline
@@ -62,12 +58,12 @@ def innovation_variance(m: Memory, variance: float) -> float:
     store(m.considered, CONSIDERED * PRODUCT + 8, third)
     store(m.considered, CONSIDERED * PRODUCT + 12, fourth)
     if considers_wind(m):
-        fifth = load(m.considered, CONSIDERED * ROW + CALM) * load(m.considered, CONSIDERED * VARIANCE + CALM)
+        fifth = load(m.considered, CONSIDERED * ROW + 16) * load(m.considered, CONSIDERED * VARIANCE + 16)
         for j in range(SIZE):
-            fifth = fifth + m.row[j] * load(m.considered, CONSIDERED * j + CALM)
-        store(m.considered, CONSIDERED * PRODUCT + CALM, fifth)
+            fifth = fifth + m.row[j] * load(m.considered, CONSIDERED * j + 16)
+        store(m.considered, CONSIDERED * PRODUCT + 16, fifth)
     total = variance + FLOOR
-    for k in range(CONSIDERED if considers_wind(m) else WIND):
+    for k in range(CONSIDERED):
         g = m.considered[ROW, k]
         if g != 0.0:
             total += g * m.considered[PRODUCT, k]
@@ -111,9 +107,9 @@ def apply_update(m: Memory, innovation: float, s: float) -> float:
         store(m.considered, offset + 8, load(m.considered, offset + 8) - gain * third)
         store(m.considered, offset + 12, load(m.considered, offset + 12) - gain * fourth)
     if considers_wind(m):
-        fifth = load(m.considered, CONSIDERED * PRODUCT + CALM) * inverse
+        fifth = load(m.considered, CONSIDERED * PRODUCT + 16) * inverse
         for i in range(SIZE):
-            offset = CONSIDERED * i + CALM
+            offset = CONSIDERED * i + 16
             store(m.considered, offset, load(m.considered, offset) - m.product[i] * fifth)
     return y * y * inverse
 

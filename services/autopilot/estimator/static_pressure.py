@@ -9,13 +9,20 @@ from lapwing.services.autopilot.estimator.filter_state import (
     GUST,
     ROW,
     SIZE,
+    VARIANCE,
     WIND,
     WIND_SQUARES,
+    Memory,
     State,
-    considers_wind,
 )
 
 _FIRST_HARMONIC = 8.0 / (3.0 * math.pi)  # of cos x |cos x|
+
+
+@always_inline
+def considers_wind(m: Memory) -> bool:
+    """Return True if the filter considers the static pressure error by wind; otherwise its columns are zero."""
+    return m.considered[VARIANCE, GUST] != 0.0
 
 
 @always_inline

@@ -186,6 +186,6 @@ def flight(seed=1, instruments=DEFAULT, p=estimator.PRESETS["rtk"], duration=40.
     keys = tuple(stream_key(seed, "drone1", name) for name in NAMES)
     draw = normal3(keys[0], TURN_ON, 999)  # the initial errors have the filter's initial deviations
     guess = (p.start_std * draw[0], p.start_std * draw[1], REST + p.start_std * draw[2])
-    fly(p, estimator.new_memory(p), instruments, keys, ticks, agility, guess, velocity, out)
+    fly(p, estimator.new_memory(), instruments, keys, ticks, agility, guess, velocity, out)
     covariance = out[:, COVARIANCE:].reshape(-1, 9, 9)
     return Flight(out[:, :9], covariance, out[:, NIS:HEALTH], out[:, HEALTH].astype(int), out[:, REJECTED].astype(int))

@@ -16,7 +16,7 @@ REST = (0.0, 0.0, P.gravity)
 
 
 def at_rest():
-    return estimator.initial(P, estimator.new_memory(P), ZERO, REST, STANDARD.magnetic_field_world)
+    return estimator.initial(P, estimator.new_memory(), ZERO, REST, STANDARD.magnetic_field_world)
 
 
 def predict_ticks(s, ticks, force=REST):

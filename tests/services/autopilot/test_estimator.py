@@ -20,20 +20,18 @@ from lapwing.dynamics.vector import ZERO
 from lapwing.services.autopilot import estimator
 from lapwing.services.autopilot.estimator import covariance_inflation, filter_state, fuse
 from lapwing.services.autopilot.estimator.covariance_propagation import propagate_considered, propagate_covariance
-from lapwing.services.sensors.barometer import StaticPressureError
 from lapwing.services.sensors.error_models import scale_and_misalignment
 
 pytestmark = pytest.mark.long
 
 P = estimator.PRESETS["rtk"]
-WINDY = P._replace(static_pressure_error=tuple(StaticPressureError()))
 SEEDS = 100
 
 
 def at_rest(attitude=NO_ROTATION, p=P):
     force = rotate_back(attitude, (0.0, 0.0, p.gravity))
     return estimator.initial(
-        p, estimator.new_memory(p), ZERO, force, rotate_back(attitude, STANDARD.magnetic_field_world)
+        p, estimator.new_memory(), ZERO, force, rotate_back(attitude, STANDARD.magnetic_field_world)
     )
 
 
@@ -87,16 +85,11 @@ def test_covariance_propagation_against_dense_matrices():
     np.testing.assert_array_equal(ours, ours.T)
 
 
-def dense_joint(rng, p=WINDY):
-    """Return memory with a random joint covariance of errors and considered parameters, and that covariance.
-
-    Without wind the columns from WIND are absent: independent of the errors, and not in any row.
-    """
-    m, n = at_rest(p=p).memory, filter_state.SIZE + filter_state.CONSIDERED
+def dense_joint(rng):
+    """Return memory with a random joint covariance of errors and considered parameters, and that covariance."""
+    m, n = at_rest().memory, filter_state.SIZE + filter_state.CONSIDERED
     a = rng.normal(size=(n, n))
     a[filter_state.SIZE :] = np.diag(rng.uniform(0.5, 2.0, filter_state.CONSIDERED)) @ np.eye(n)[filter_state.SIZE :]
-    if not filter_state.expects_wind(p):
-        a[:, filter_state.SIZE + filter_state.WIND :] = 0.0
     joint = a @ a.T  # the parameters are independent of each other
     m.covariance[:] = joint[: filter_state.SIZE, : filter_state.SIZE]
     m.considered[: filter_state.SIZE] = joint[: filter_state.SIZE, filter_state.SIZE :]
@@ -104,11 +97,10 @@ def dense_joint(rng, p=WINDY):
     return m, joint
 
 
-@pytest.mark.parametrize("p", [P, WINDY], ids=["no wind", "wind"])
-def test_considered_propagation_against_dense_matrices(p):
+def test_considered_propagation_against_dense_matrices():
     """Joint covariance F P F^T for gyroscopes that read M omega, M of (3.14), and accelerometers that read M f."""
     rng = np.random.default_rng(2)
-    m, joint = dense_joint(rng, p)
+    m, joint = dense_joint(rng)
     n, f, omega, dt = len(joint), rng.normal(size=3), rng.normal(size=3), 0.01
     r = np.array(rotation_matrix(from_roll_pitch_yaw(0.3, -0.5, 2.0))).reshape(3, 3)
     a = np.zeros((n, n))
@@ -136,14 +128,11 @@ def test_considered_propagation_against_dense_matrices(p):
     np.testing.assert_array_equal(m.covariance, m.covariance.T)
 
 
-@pytest.mark.parametrize("p", [P, WINDY], ids=["no wind", "wind"])
-def test_considered_update_against_joseph_form(p):
+def test_considered_update_against_joseph_form():
     """Schmidt's gain does not change the parameters; Joseph's form of the joint covariance holds for any gain."""
     rng = np.random.default_rng(3)
-    m, joint = dense_joint(rng, p)
+    m, joint = dense_joint(rng)
     h, y, variance = rng.normal(size=len(joint)), 0.7, 0.3
-    if not filter_state.expects_wind(p):
-        h[filter_state.SIZE + filter_state.WIND :] = 0.0
     m.row[:], m.considered[filter_state.ROW] = h[: filter_state.SIZE], h[filter_state.SIZE :]
     nis = fuse.fuse(m, y, variance)
     s = h @ joint @ h + variance
@@ -156,17 +145,6 @@ def test_considered_update_against_joseph_form(p):
     np.testing.assert_allclose(
         m.considered[: filter_state.SIZE], expected[: filter_state.SIZE, filter_state.SIZE :], atol=1e-11
     )
-
-
-def test_kernels_have_no_code_for_wind_without_static_pressure_error():
-    """Columns of wind are not read: NaN in them would spread to the covariance."""
-    m, _ = dense_joint(np.random.default_rng(4), P)
-    m.considered[:, filter_state.CALM :] = math.nan
-    m.row[:] = m.considered[filter_state.ROW, : filter_state.WIND] = 1.0
-    fuse.fuse(m, 0.7, 0.3)
-    propagate_considered(m, (0.1, 0.2, 0.3), (0.0, 0.0, 9.81), (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0), 0.01)
-    assert np.isfinite(m.covariance).all()
-    assert np.isfinite(m.considered[:, : filter_state.CALM]).all()
 
 
 def test_scalar_updates_one_by_one_equal_joint_update():

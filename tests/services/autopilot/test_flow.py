@@ -26,7 +26,7 @@ def test_row_against_differences_and_sensor(axis):
     """The row is the change of a camera's flow by errors of attitude and velocity."""
     attitude, velocity, distance = from_roll_pitch_yaw(0.3, -0.2, 1.0), np.array([2.0, -1.0, 0.5]), 4.0
     memory = ef.estimator.initial(
-        P, ef.estimator.new_memory(P), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81), P.magnetic_field_world
+        P, ef.estimator.new_memory(), (0.0, 0.0, 0.0), (0.0, 0.0, 9.81), P.magnetic_field_world
     ).memory
     r = tuple(rotation_matrix(attitude))
 
@@ -94,7 +94,7 @@ def flights(sees):
         keys = tuple(stream_key(seed, "drone1", name) for name in names)
         draw = normal3(keys[0], TURN_ON, 999)
         guess = (P.start_std * draw[0], P.start_std * draw[1], ef.REST + P.start_std * draw[2])
-        fly(P, estimator.new_memory(P), instruments, keys, guess, sees, out[seed])
+        fly(P, estimator.new_memory(), instruments, keys, guess, sees, out[seed])
     return out[..., :9], out[..., ef.COVARIANCE :].reshape(*out.shape[:2], 9, 9), out[..., ef.HEALTH].astype(int)
 
 

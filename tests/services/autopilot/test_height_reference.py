@@ -32,7 +32,7 @@ def test_height_source_follows_parameter(reference, least, most):
 def test_ground_variation_leaves_barometer_sum_unchanged():
     """The ground's variation changes only the variance of z, not of z + b_h or of other states."""
     p, rng = estimator.PRESETS["rtk"], np.random.default_rng(3)
-    s = estimator.initial(p, estimator.new_memory(p), (0.0, 0.0, 0.35), (0.0, 0.0, 9.81), p.magnetic_field_world)
+    s = estimator.initial(p, estimator.new_memory(), (0.0, 0.0, 0.35), (0.0, 0.0, 9.81), p.magnetic_field_world)
     s = s._replace(nominal=s.nominal._replace(velocity_world=(3.0, 4.0, 1.0)))
     root = rng.normal(size=(filter_state.SIZE, filter_state.SIZE))
     s.memory.covariance[:] = root @ root.T

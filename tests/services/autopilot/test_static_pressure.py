@@ -23,7 +23,7 @@ DENSITY = 1.225
 
 def flying(p, velocity=ZERO, yaw=0.0, altitude=10.0):
     """Return the filter's state in level flight."""
-    s = estimator.initial(p, estimator.new_memory(p), ZERO, (0.0, 0.0, p.gravity), STANDARD.magnetic_field_world)
+    s = estimator.initial(p, estimator.new_memory(), ZERO, (0.0, 0.0, p.gravity), STANDARD.magnetic_field_world)
     attitude = from_roll_pitch_yaw(0.0, 0.0, yaw)
     return s._replace(
         nominal=s.nominal._replace(velocity_world=velocity, attitude=attitude, position_world=(0.0, 0.0, altitude))

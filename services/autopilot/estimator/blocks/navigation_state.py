@@ -4,7 +4,6 @@ from typing import NamedTuple
 
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.vector import ZERO
-from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.autopilot.estimator.filter_state import Inertial, Nominal, State, new_memory
 
 
@@ -15,8 +14,8 @@ class NavigationState(NamedTuple):
     filter: State  # undefined before the start
 
 
-def blank(p: Estimator) -> NavigationState:
+def blank() -> NavigationState:
     """Return the state before the first reading."""
     nominal = Nominal(NO_ROTATION, ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0.0, 0.0, 0.0)
     inertial = Inertial(0, ZERO, ZERO, ZERO, ZERO, ZERO, False, 0)
-    return NavigationState(False, State(nominal, inertial, new_memory(p)))
+    return NavigationState(False, State(nominal, inertial, new_memory()))
