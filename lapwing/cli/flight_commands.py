@@ -66,6 +66,7 @@ def validate(
 
 @app.command()
 def identify(
+    context: typer.Context,
     scene: SceneFile,
     flights: Flights,
     out: Annotated[
@@ -97,8 +98,7 @@ def identify(
     if out.suffix != ".toml":
         raise ValueError(f"--out {out}: expected a name that ends in .toml")
     if sensors:
-        if free or json:
-            raise ValueError("--sensors: estimates all sensors; leave out --free and --json")
+        _check_sensor_options(context)
         _fit_sensors(flights, mapping, out)
         return
     keys = [key.strip() for key in free.split(",") if key.strip()]
@@ -120,6 +120,20 @@ def identify(
     typer.echo(f"{out}: the airframe; its first lines contain the values for the scene")
     if json:
         console_output.write_json(json, result)
+
+
+def _is_given(context: typer.Context, name: str) -> bool:
+    source = context.get_parameter_source(name)
+    return source is not None and source.name == "COMMANDLINE"
+
+
+def _check_sensor_options(context: typer.Context) -> None:
+    """Raise ValueError if the user gives an option that `--sensors` does not use."""
+    used = {"scene", "flights", "out", "sensors", "mapping"}
+    given = [name for name in context.params if _is_given(context, name)]
+    unused = [f"--{name.strip('_').replace('_', '-')}" for name in given if name not in used]
+    if unused:
+        raise ValueError(f"--sensors: estimates all sensors, from all samples; leave out {', '.join(unused)}")
 
 
 def _fit_sensors(flights: list[Path], mapping: str | None, out: Path) -> None:
@@ -162,13 +176,13 @@ def import_(
         raise ValueError(f"--out {out}: expected a name that ends in .mcap")
     if flight.suffix == ".mcap" and flight.is_file() and is_log(flight):
         raise ValueError(f"{flight}: is a Lapwing log already; use it without import, e.g. lapwing report {flight}")
+    check_log(out)
+    claim(out)
     recording = open_flight(flight, mapping, vehicle)
     if mapping is not None and not takes_mapping(flight):
         raise ValueError(UNUSED_MAPPING.format(mapping, flight))
     if not recording.valid.any():
         raise ValueError(f"{flight}: no valid sample; check the --mapping")
-    check_log(out)
-    claim(out)
     write_log(out.resolve(), recording, flight.name)
     typer.echo(f"{out}: {len(recording) * recording.interval:.1f} s, {int((~recording.valid).sum())} samples left out")
     for cause, count in recording.faults.items():

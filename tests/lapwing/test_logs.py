@@ -286,7 +286,7 @@ def test_unchanged_types_of_other_version_are_replayed(lapwing, old):
     ("arguments", "output"),
     [
         (["info", "none.mcap"], "none.mcap: cannot read the log"),
-        (["info", "text.mcap"], "text.mcap: not an MCAP file"),
+        (["info", "text.mcap"], "text.mcap: not an MCAP file; `lapwing import`"),
         (["verify", "whole.mcap", "whole.mcap"], "is the same file as FILE"),
         (["verify", "foreign.mcap"], "has no digest"),
         (["recover", "whole.mcap"], "no recovery is needed"),

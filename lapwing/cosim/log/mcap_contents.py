@@ -132,7 +132,8 @@ class Contents:
         file = self._file
         size = os.fstat(file.fileno()).st_size
         if file.read(len(MCAP0_MAGIC)) != MCAP0_MAGIC:
-            raise ValueError(f"{self._path}: {'not an MCAP file' if size else 'is empty; expected a log (MCAP)'}")
+            foreign = "not an MCAP file; `lapwing import` converts the logs of autopilots"
+            raise ValueError(f"{self._path}: {foreign if size else 'is empty; expected a log (MCAP)'}")
         offset, unpacked = len(MCAP0_MAGIC), 0
         while offset + _RECORD.size <= size:
             opcode, length = _RECORD.unpack(file.read(_RECORD.size))

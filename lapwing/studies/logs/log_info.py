@@ -46,7 +46,8 @@ class Info(NamedTuple):
         elif self.other_versions:
             result["report"] = result["replay"] = f"messages of this version: {'; '.join(self.other_versions.values())}"
         if SETUP_FILE not in self.files:
-            result["resimulate"] = f"an attachment {SETUP_FILE}"
+            imported = self.metadata.get("mode") == "imported"
+            result["resimulate"] = "a scene, it is a recorded flight" if imported else f"an attachment {SETUP_FILE}"
         if "digest" not in self.metadata:
             result["verify"] = "a digest in its metadata"
         return result

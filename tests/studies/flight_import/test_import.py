@@ -169,6 +169,7 @@ def test_log_of_imported_flight_repeats_it_and_keeps_its_gaps(flight, tmp_path):
     done = run("validate", "crazyflie_21", out, source, "--mapping", "nanobench")
     assert done.returncode == 0, done.stderr
     assert "flight: the same flight as imported" in done.stdout
+    assert "lacks a scene, it is a recorded flight" in run("info", out).stdout
 
 
 @pytest.mark.long

@@ -133,6 +133,8 @@ def test_command_writes_tables_that_scene_takes(tmp_path):
     overrides = [f"sensors.{n}.{k}={v}" for n, t in tables.items() for k, v in t.items() if not isinstance(v, dict)]
     checked = run("check", scene, *[part for o in overrides for part in ("--set", o)])
     assert checked.returncode == 0, checked.stderr
-    both = run("identify", scene, "f.mcap", "--sensors", "--free", "airframe.mass.total", "--out", "s.toml")
+    unused = ("--free", "airframe.mass.total", "--seed", "1", "--set", "run.duration=1")
+    both = run("identify", scene, "f.mcap", "--sensors", *unused, "--out", "s.toml")
     assert both.returncode == 2
-    assert "leave out --free" in both.stderr
+    assert "leave out --free, --seed, --set" in both.stderr
+    assert not (tmp_path / "s.toml").exists()
