@@ -86,6 +86,12 @@ def test_thinned_path_keeps_points_beside_gap():
     assert {3, 4, 5} <= set(keep)
 
 
+def test_path_without_first_and_last_point_is_thinned():
+    path = np.arange(9.0)[:, None] * np.array([1.0, 2.0])
+    path[[0, -1]] = np.nan
+    assert thin_path(path, 1e-6).tolist() == [0, 1, 7, 8]
+
+
 def test_rod_ends_at_its_points():
     rod = solids.rod((1.0, 2.0, 3.0), (1.0, 2.0, 7.0), 0.5, "#000000")
     assert rod.vertices.min(axis=0) == pytest.approx([0.5, 1.5, 3.0])

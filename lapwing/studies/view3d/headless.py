@@ -14,7 +14,7 @@ ENDED = "the headless browser has ended unexpectedly; try again with fewer progr
 PROGRAM = next(filter(None, map(shutil.which, PROGRAMS)), None)
 # OpenGL of the system, whose software renderer is twice as fast as that of the browser, the fallback.
 # The DevTools pipe is at descriptors 3 and 4.
-START = 'exec "$0" --headless=new --no-sandbox --disable-dev-shm-usage --use-angle=gl-egl \
+START = 'exec "$0" {flags} --headless=new --no-sandbox --disable-dev-shm-usage --use-angle=gl-egl \
 --ignore-gpu-blocklist --enable-unsafe-swiftshader \
 --remote-debugging-pipe --user-data-dir="$1" about:blank 3<&{reading} 4>&{writing}'
 
@@ -30,16 +30,20 @@ class Browser:
         errors: exceptions and error lines of the page's console.
     """
 
-    def __init__(self, page: Path | str, profile: Path | None = None, size: tuple[int, int] | None = None):
+    def __init__(
+        self, page: Path | str, profile: Path | None = None, size: tuple[int, int] | None = None, flags: str = ""
+    ):
         """Create a browser.
 
         Args:
             page: path or address of the page.
             profile: folder of the browser's profile; None: a temporary one.
             size: width and height of the window [pixel]; None: the default.
+            flags: further options of the browser.
         """
         self.errors: list[str] = []
-        self._page, self._size, self._number, self._rest = page, size, 0, b""
+        self._page, self._size, self._flags = page, size, flags
+        self._number, self._rest = 0, b""
         self._temporary = tempfile.TemporaryDirectory(ignore_cleanup_errors=True) if profile is None else None
         self._profile = Path(self._temporary.name) if self._temporary else profile
 
@@ -48,7 +52,13 @@ class Browser:
             raise ValueError(f"no headless browser: none of {', '.join(PROGRAMS)} is installed; install chromium")
         reading, self._to = os.pipe()
         self._from, writing = os.pipe()
-        command = ["bash", "-c", START.format(reading=reading, writing=writing), PROGRAM, str(self._profile)]
+        command = [
+            "bash",
+            "-c",
+            START.format(flags=self._flags, reading=reading, writing=writing),
+            PROGRAM,
+            str(self._profile),
+        ]
         self._process = subprocess.Popen(command, pass_fds=(reading, writing), stderr=subprocess.DEVNULL)
         os.close(reading)
         os.close(writing)

@@ -1,5 +1,6 @@
 """Indices of samples by time, and rounded quaternions, which compress well in a recording."""
 
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -51,22 +52,25 @@ def thin_path(path: np.ndarray, tolerance: float) -> np.ndarray:
     """Return ascending indices of the points of a path that suffice to draw it, with the first and the last.
 
     Args:
-        path: points at equal time steps, shape (n, k), n >= 2.
+        path: points at equal time steps, shape (n, k), n >= 2; the first and the last of a gap (NaN) are kept, too.
         tolerance: largest distance between a point and the straight line between the remaining points at its time.
 
     Source: Douglas, Peucker, 1973, with the distance at equal times instead of the shortest one.
     """
     keep = np.zeros(len(path), bool)
     keep[[0, -1]] = True
-    pieces = [(0, len(path) - 1)]
+    missing = np.isnan(path).any(axis=1)
+    borders = np.flatnonzero(missing[1:] != missing[:-1])
+    keep[borders] = keep[borders + 1] = True
+    pieces = list(pairwise(np.flatnonzero(keep).tolist()))
     while pieces:
         first, last = pieces.pop()
-        if last - first < 2:
+        if last - first < 2 or missing[first]:
             continue
         share = np.linspace(0.0, 1.0, last - first + 1)[:, None]
         apart = np.linalg.norm(path[first : last + 1] - (1.0 - share) * path[first] - share * path[last], axis=1)
-        worst = first + int(np.argmax(np.nan_to_num(apart, nan=np.inf)))
-        if not apart[worst - first] <= tolerance:  # also at NaN
+        worst = first + int(np.argmax(apart))
+        if apart[worst - first] > tolerance:
             keep[worst] = True
             pieces += [(first, worst), (worst, last)]
     return np.flatnonzero(keep)
