@@ -72,7 +72,7 @@ def test_parabolas_are_reproduced_within_outermost_cells():
 def test_height_gradient_and_force_are_continuous_across_cells(axis):
     """Borders at every sample, at the edge, and at two samples beyond it."""
     nodes, other = ((COLUMNS, ROWS), (ROWS, COLUMNS))[axis]
-    borders = np.concatenate([nodes[:1] - (1.0, 0.5), nodes, nodes[-1:] + (0.5, 1.0)])
+    borders = np.arange(nodes[0] - 1.0, nodes[-1] + 1.25, SPACING)
     for border, across in itertools.product(
         borders.tolist(), np.linspace(other[0] - 1.5, other[-1] + 1.5, 23).tolist()
     ):
