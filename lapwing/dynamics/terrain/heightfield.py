@@ -17,28 +17,38 @@ class Relief(NamedTuple):
     bump_height: float  # [m] A of bumps A sin(k x) sin(k y)
     bump_wavenumber: float  # [rad/m] k
     base: float  # [m] height at home without bumps and grid
-    grid: np.ndarray  # (rows along y, columns along x) heights [m]; (0, 0): none
+    grid: np.ndarray  # (rows along y, columns along x) heights [m] with the border of `BORDER`; (0, 0): none
     corner: tuple[float, float]  # [m] world x and y of grid[0, 0]
     spacing: float  # [m] spacing of the grid
+    grid_slope: float  # bound of the slope of the grid
     boxes: np.ndarray  # (n, 8) x, y of a point, cosine, sine of the heading, ends along it, half width, z of the top
     cylinders: np.ndarray  # (n, 4) x, y of the axis, radius, z of the top
     summit: float  # [m] largest height of the terrain above the plane through the origin with that slope
 
 
 @kernel
+def _cubic(a, b, c, d, p):
+    """Return (value, derivative) at p between b (p = 0) and c (p = 1), with central differences as slopes there."""
+    rise, first, last = c - b, 0.5 * (c - a), 0.5 * (d - b)
+    square, cube = 3.0 * rise - 2.0 * first - last, first + last - 2.0 * rise
+    return b + p * (first + p * (square + p * cube)), first + p * (2.0 * square + 3.0 * p * cube)
+
+
+@kernel
 def _between(t, x, y):
-    """Return (height, slope along x, slope along y) of the grid, bilinear, with constant extrapolation."""
+    """Return (height, slope along x, slope along y) of the grid by cubic convolution (theory.md, eq. (2.82))."""
     rows, columns = t.grid.shape
-    u, v = (x - t.corner[0]) / t.spacing, (y - t.corner[1]) / t.spacing
-    inside_x, inside_y = 0.0 <= u <= columns - 1.0, 0.0 <= v <= rows - 1.0
-    u, v = min(max(0.0, u), columns - 1.0), min(max(0.0, v), rows - 1.0)  # this order of arguments maps NaN to 0
-    i, j = min(int(v), rows - 2), min(int(u), columns - 2)
-    q, p = v - i, u - j
-    a, b, c, d = t.grid[i, j], t.grid[i, j + 1], t.grid[i + 1, j], t.grid[i + 1, j + 1]
-    height = (1.0 - q) * ((1.0 - p) * a + p * b) + q * ((1.0 - p) * c + p * d)
-    rise_x = ((1.0 - q) * (b - a) + q * (d - c)) / t.spacing if inside_x else 0.0
-    rise_y = ((1.0 - p) * (c - a) + p * (d - b)) / t.spacing if inside_y else 0.0
-    return height, rise_x, rise_y
+    # the border is level; this order of arguments maps NaN to 1
+    u = min(max(1.0, (x - t.corner[0]) / t.spacing), columns - 3.0)
+    v = min(max(1.0, (y - t.corner[1]) / t.spacing), rows - 3.0)
+    i, j, g = int(v), int(u), t.grid
+    p, q = u - j, v - i
+    a, along_a = _cubic(g[i - 1, j - 1], g[i - 1, j], g[i - 1, j + 1], g[i - 1, j + 2], p)
+    b, along_b = _cubic(g[i, j - 1], g[i, j], g[i, j + 1], g[i, j + 2], p)
+    c, along_c = _cubic(g[i + 1, j - 1], g[i + 1, j], g[i + 1, j + 1], g[i + 1, j + 2], p)
+    d, along_d = _cubic(g[i + 2, j - 1], g[i + 2, j], g[i + 2, j + 1], g[i + 2, j + 2], p)
+    height, across = _cubic(a, b, c, d, q)
+    return height, _cubic(along_a, along_b, along_c, along_d, q)[0] / t.spacing, across / t.spacing
 
 
 @kernel
@@ -201,6 +211,7 @@ def ray(t, origin, direction, longest):
     return after if after <= longest else math.inf
 
 
+BORDER = 4  # samples outside the edge of a grid: one on the line of the last two, then level ground
 FINEST = 0.02  # [m] a ray may miss narrower objects
 CAUTION = 0.25  # step of the march relative to the gap under the ray
 HALVINGS = 50

@@ -15,16 +15,13 @@ def as_relief(terrain: Level | Relief) -> Relief:
     if isinstance(terrain, Relief):
         return terrain
     none = (np.zeros((0, 0)), np.zeros((0, 7)), np.zeros((0, 4)))
-    return Relief((0.0, 0.0), 0.0, 1.0, 0.0, none[0], (0.0, 0.0), 1.0, none[1], none[2], 0.0)
+    return Relief((0.0, 0.0), 0.0, 1.0, 0.0, none[0], (0.0, 0.0), 1.0, 0.0, none[1], none[2], 0.0)
 
 
 def steepness(terrain: Relief) -> float:
     """Return a bound of the slope [m/m] of the ground without obstacles, so that a march misses nothing."""
     steep = math.hypot(*terrain.slope) + abs(terrain.bump_height) * terrain.bump_wavenumber * math.sqrt(2.0)
-    if terrain.grid.size:
-        along, across = (float(np.abs(np.diff(terrain.grid, axis=k)).max()) / terrain.spacing for k in (1, 0))
-        steep += math.hypot(along, across)
-    return steep
+    return steep + terrain.grid_slope
 
 
 @kernel

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.terrain.heightfield import Relief, field
+from lapwing.dynamics.terrain.heightfield import BORDER, Relief, field
 from lapwing.dynamics.terrain.terrain_queries import LEVEL, Level
 from lapwing.kernels import math
 
@@ -45,7 +45,11 @@ def relief(
     Raises:
         ConfigError: ground steeper than 45 degrees, a grid without home, steps out of order.
     """
-    heights = np.zeros((0, 0)) if grid is None else _validate_grid(grid, corner, spacing)
+    heights, highest, grid_slope = np.zeros((0, 0)), 0.0, 0.0
+    if grid is not None:
+        heights = _with_border(_validate_grid(grid, corner, spacing))
+        highest, grid_slope = _bounds(heights, spacing)
+        corner = (corner[0] - BORDER * spacing, corner[1] - BORDER * spacing)
     steep = math.hypot(*slope) + abs(bump_height) * 2.0 * math.pi / bump_length
     if steep > STEEPEST:
         key = "bump_height" if bump_height else "slope"
@@ -55,17 +59,17 @@ def relief(
     plane = [[u * slope[0] + v * slope[1] for u, v in _corners(row)] for row in rows]
     over = [row[7] - min(z) for row, z in zip(rows, plane, strict=True)]
     over += [z - slope[0] * x - slope[1] * y + radius * math.hypot(*slope) for x, y, radius, z in cylinders]
-    summit = max([base + bump_height + (float(heights.max()) if heights.size else 0.0), *over])
+    summit = max([base + bump_height + highest, *over])
     result = Relief(
         (float(slope[0]), float(slope[1])), float(bump_height), 2.0 * math.pi / bump_length, base, heights,
-        (float(corner[0]), float(corner[1])), float(spacing),
+        (float(corner[0]), float(corner[1])), float(spacing), grid_slope,
         np.array(rows, dtype=float).reshape(-1, 8), np.array(cylinders, dtype=float).reshape(-1, 4), float(summit),
     )  # fmt: skip
     if tuple(slope) == (0.0, 0.0) and bump_height == 0.0 and not (heights.size or rows or len(cylinders)):
         return LEVEL
     if heights.size:  # z counts from the ground at home
-        result = result._replace(grid=heights - field(result, 0.0, 0.0)[0])
-        result = result._replace(summit=summit + float(result.grid.max() - heights.max()))
+        home = field(result, 0.0, 0.0)[0]
+        result = result._replace(grid=heights - home, summit=max([base + bump_height + highest - home, *over]))
     return result
 
 
@@ -85,6 +89,22 @@ def _validate_grid(grid: np.ndarray, corner: tuple[float, float], spacing: float
             "grid.heights", message, "a tangent of at most 1 between neighbours; steps and boxes are walls"
         )
     return heights
+
+
+def _with_border(heights: np.ndarray) -> np.ndarray:
+    """Return the heights with samples outside: one on the line of the last two, then level ground."""
+    return np.pad(np.pad(heights, 1, "reflect", reflect_type="odd"), BORDER - 1, "edge")
+
+
+def _bounds(heights: np.ndarray, spacing: float) -> tuple[float, float]:
+    """Return bounds of the height [m] and the slope of the bicubic surface: those of its Bezier points."""
+    points = heights
+    for axis in (0, 1):
+        third = np.gradient(points, axis=axis) / 3.0
+        shape = [n * (3 if k == axis else 1) for k, n in enumerate(points.shape)]
+        points = np.stack((points - third, points, points + third), axis=axis + 1).reshape(shape)
+    along, across = (3.0 * float(np.abs(np.diff(points, axis=axis)).max()) / spacing for axis in (1, 0))
+    return float(points.max()), math.hypot(along, across)
 
 
 def _row(box: Box) -> list[float]:

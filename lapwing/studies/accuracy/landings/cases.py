@@ -5,7 +5,7 @@ import time
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -39,6 +39,9 @@ CLEARANCE = 2e-3  # [m] initial height of the lowest point above the ground
 WAVE = 2.0 * math.pi / 0.7  # [1/m] of bumps
 MAX_STEPS = 64  # in an interval
 NO_STEP = (math.inf, 0.0)
+NO_FOLD = (0.0, 1.0)
+FOOT = (0.2, 0.25)  # [m] x and y of a front foot in the body
+FLANK = 4.0  # [m] least length of the ground on each side of a fold
 AIRBORNE_HEIGHT = 50.0  # [m] above the ground, without contact within the duration
 
 
@@ -55,6 +58,7 @@ class Landing(NamedTuple):
     rotor_speed: float  # [rad/s] initial, decaying
     start: float = 0.0  # [m] x of the centre of mass
     step: tuple[float, float] = NO_STEP  # [m] x of the wall; rise
+    fold: tuple[float, float] = NO_FOLD  # rise of a grid of heights on both sides of x = 0; [m] spacing of the grid
     tips: bool = False  # True: points of the hull at the propeller tips instead of the hubs
 
 
@@ -93,6 +97,22 @@ def draw_step(seed: int) -> Landing:
     )  # fmt: skip
 
 
+def draw_fold(seed: int) -> Landing:
+    """Return a random landing with a foot near a fold of a grid: a valley (even seeds) or a ridge (odd seeds).
+
+    In every other pair of landings two feet are along the fold.
+    """
+    rng, case = np.random.default_rng([37, seed]), draw(seed)
+    rise, spacing = float(rng.uniform(0.1, 0.4)), float(10.0 ** rng.uniform(-1.0, 0.0))
+    heading = case.heading if seed % 4 < 2 else 0.0
+    foot = FOOT[0] * math.cos(heading) - FOOT[1] * math.sin(heading)  # its x while the vehicle is upright
+    return case._replace(
+        bump=0.0, heading=heading, start=float(rng.uniform(-0.05, 0.05)) - foot, speed=min(case.speed, 1.0),
+        slip=scale(0.2, (*case.slip, 0.0))[:2], tilt=scale(0.4, case.tilt),
+        fold=(rise if seed % 2 == 0 else -rise, spacing),
+    )  # fmt: skip
+
+
 def draw_toppling(seed: int) -> Landing:
     """Return a random landing on one or two feet, tilted by 30 to 60 degrees, that turns over onto the hull."""
     rng = np.random.default_rng([35, seed])
@@ -119,7 +139,7 @@ def draw_strike(seed: int) -> Landing:
 
 
 DRAWS: dict[str, Callable[[int], Landing]] = {
-    "random": draw, "steps": draw_step, "toppling": draw_toppling, "strikes": draw_strike,
+    "random": draw, "steps": draw_step, "folds": draw_fold, "toppling": draw_toppling, "strikes": draw_strike,
 }  # fmt: skip
 FASTEST = Landing(
     (0.0, 0.0), 0.0, 3.0, (2.0, 0.0), (0.5, 0.0, 0.0), 0.0, (10.0, 10.0, 10.0), 300.0
@@ -132,19 +152,33 @@ def plant(case: Landing) -> tuple[MultirotorParameters, MultirotorState]:
     if case.tips:
         frame = _with_tips(frame)
     steps = [case.step] if case.step != NO_STEP else []
-    terrain = relief(case.slope, bump_height=case.bump, bump_length=2.0 * math.pi / WAVE, steps=steps)
+    terrain = relief(case.slope, bump_height=case.bump, bump_length=2.0 * math.pi / WAVE, steps=steps, **_grid(case))
     tables: dict[str, dict] = {"gravity": {}, "ground_contact": {}, "rotor_thrust": {}}
     p = multirotor.parameters(frame, effects.from_scene(tables, frame, Environment(terrain=terrain)))
     attitude = multiply(exp((0.0, 0.0, case.heading)), exp(case.tilt))
     matrix = of_state(Quaternion(*attitude)).reshape(3, 3)
     points = np.array(contact_of(p).feet) @ matrix.T
     edge, rise = case.step
-    ground = (case.slope[0] * x + case.slope[1] * y + (rise if case.start + x > edge else 0.0) for x, y, _ in points)
+    ground = (
+        case.slope[0] * (case.start + x) + case.slope[1] * y + (rise if case.start + x > edge else 0.0)
+        + max(0.0, case.fold[0]) * abs(case.start + x)
+        for x, y, _ in points
+    )  # fmt: skip
     clearance = max(height - z for height, (_, _, z) in zip(ground, points, strict=True)) + case.bump + CLEARANCE
     state = multirotor.initial_state(
         p, (case.start, 0.0, float(clearance)), attitude, case.rotor_speed, (*case.slip, -case.speed), case.spin
     )
     return p, state
+
+
+def _grid(case: Landing) -> dict[str, Any]:
+    """Return the arguments of `relief` for the grid of a fold along y."""
+    rise, spacing = case.fold
+    if rise == 0.0:
+        return {}
+    n = math.ceil(FLANK / spacing)
+    heights = np.add.outer(np.zeros(2), rise * spacing * np.abs(np.arange(-n, n + 1.0)))
+    return {"grid": heights, "corner": (-n * spacing, -0.5 * spacing), "spacing": spacing}
 
 
 def _with_tips(frame: Airframe) -> Airframe:
@@ -175,7 +209,7 @@ def exact(case: Landing, tolerance: float = 3e-15) -> tuple[np.ndarray, int]:
     )  # fmt: skip
     ground = LandingGround(
         case.slope, case.bump, WAVE, e.stiffness, e.damping, 1.0 / e.inverse_width, e.static, e.dynamic,
-        e.tangential_stiffness, e.tangential_damping, 1.0 / e.inverse_stiction, *case.step,
+        e.tangential_stiffness, e.tangential_damping, 1.0 / e.inverse_stiction, *case.step, *case.fold,
     )  # fmt: skip
     start = np.concatenate([of_state(state.motion), np.zeros(3 * len(e.feet))])
     states, events = landing(body, ground, start, times(), tolerance)

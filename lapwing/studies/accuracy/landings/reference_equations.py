@@ -47,6 +47,8 @@ class LandingGround(NamedTuple):
     slow: float  # [m/s] slip of the dynamic coefficient
     edge: float = math.inf  # [m] x of the step's wall
     rise: float = 0.0  # [m] z of its level top
+    flank: float = 0.0  # slope of the ground on both sides of a fold at x = 0
+    rounding: float = 1.0  # [m] x to which the fold is rounded
 
 
 @kernel
@@ -63,10 +65,16 @@ def _foot(body: Any, ground: Any, cases: np.ndarray, y: np.ndarray, i: int) -> A
     u, v = ground.wave * (y[0] + arm[0]), ground.wave * (y[1] + arm[1])
     height = ground.slope[0] * (y[0] + arm[0]) + ground.slope[1] * (y[1] + arm[1])
     height += ground.bump * math.sin(u) * math.sin(v)
-    gradient = ground.bump * ground.wave
+    gradient, fold = ground.bump * ground.wave, (y[0] + arm[0]) / ground.rounding
+    flank = ground.flank if fold >= 0.0 else -ground.flank
+    if abs(fold) < 1.0:  # between samples |x|: cubic with the slopes 0 and 1 at its ends
+        flank *= abs(fold) * (4.0 - 3.0 * abs(fold))
+        height += ground.flank * ground.rounding * fold * fold * (2.0 - abs(fold))
+    else:
+        height += ground.flank * abs(y[0] + arm[0])
     normal = np.array(
         [
-            -ground.slope[0] - gradient * math.cos(u) * math.sin(v),
+            -ground.slope[0] - flank - gradient * math.cos(u) * math.sin(v),
             -ground.slope[1] - gradient * math.sin(u) * math.cos(v),
             1.0,
         ]
