@@ -48,7 +48,7 @@ class Steps(Table):
 
 
 class Grid(Table):
-    """Heights on a grid relative to the height at home, bilinear between points, constant beyond the edge."""
+    """Heights on a grid relative to the height at home, bicubic between points, level two spacings beyond the edge."""
 
     file: str | None = None  # path relative to the scene: an .npy array, rows along world y, columns along x; a GeoTIFF
     heights: tuple[Heights, ...] | None = Field(default=None, strict=False)  # [m] rows, instead of a file

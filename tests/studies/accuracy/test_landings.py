@@ -46,14 +46,16 @@ def test_strike_of_propeller_comes_before_feet():
         ("steps", 2),
         ("steps", 3),
         ("steps", 16),
+        ("folds", 1),
+        ("folds", 2),
         ("toppling", 0),
         ("toppling", 6),
         ("toppling", 7),
         ("strikes", 0),
     ],
 )
-def test_landing_at_step_toppling_or_strike_meets_accuracy(kind, seed):
-    """Cases: into a wall, over an edge, over one foot onto the hull, on a propeller.
+def test_landing_at_step_fold_toppling_or_strike_meets_accuracy(kind, seed):
+    """Cases: into a wall, over an edge, on a ridge and in a valley, over one foot onto the hull, on a propeller.
 
     At steps 2 and 16 a foot is in wall and ground at once.
     """

@@ -32,7 +32,7 @@ class LandingBody(NamedTuple):
 
 
 class LandingGround(NamedTuple):
-    """Ground z = a x + b y + A sin k x sin k y, on it a step up along x, and the law of contact."""
+    """Ground z = a x + b y + A sin k x sin k y, on it a step up along x or a rounded fold; the law of contact."""
 
     slope: tuple[float, float]
     bump: float  # [m] A
