@@ -121,7 +121,7 @@ def test_card_and_autopilot_use_active_rotor_model(tmp_path, tables):
 
 
 def test_airframe_without_rotor_model_is_rejected(tmp_path):
-    with pytest.raises(ValueError, match=r"no \[propeller\]; give a scene with \[effects.rotor_quadratic\]"):
+    with pytest.raises(ValueError, match=r"no \[propeller\]; use a scene with \[effects.rotor_quadratic\]"):
         card(airframe_without(tmp_path, "propeller"))
     with pytest.raises(ValueError, match=r"effects.rotor_thrust: the vehicle has no \[propeller\]"):
         load("hover", {"vehicle.airframe": str(airframe_without(tmp_path, "propeller"))})

@@ -94,6 +94,8 @@ def test_former_tables_resolve_to_present_scene(name):
     for entry, other in zip(tables, default, strict=True):
         if entry["success"]["require"] == ["outcome != 'crashed'", "outcome != 'diverged'"]:  # default of 0.1.0
             entry["success"] = other["success"]
+        if "run" in entry:
+            entry["run"]["title"] = other["run"]["title"]  # rewritten since
         motor = entry.get("airframe", {}).get("motor", {})
         if motor.get("peak_current") == 29.7:  # current at 24 V with power at 48 V, corrected since
             motor["peak_current"] = 26.5

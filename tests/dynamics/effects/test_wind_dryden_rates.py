@@ -119,5 +119,5 @@ def test_rates_depend_on_vehicle_span(drone, situation):
     s = situation(turn=(0, 0, math.pi / 2))
     assert wind_dryden_rates.py_func(e, memory, s, Air(1.2, (0.0, 0.0, 0.0))).wind_world == (1.0, 2.0, 3.0)
     assert add_gust_rate.py_func(e, memory, s, (1.0, 0.0, 0.0)) == pytest.approx((1.2, -0.1, 0.3))
-    with pytest.raises(ConfigError, match=r"both are a turbulence"):
+    with pytest.raises(ConfigError, match=r"cannot be combined with effects\.wind_dryden, also a turbulence"):
         effects.from_scene({"wind_dryden": {"wind_speed": 7.0}, "wind_dryden_rates": {"wind_speed": 7.0}}, drone)

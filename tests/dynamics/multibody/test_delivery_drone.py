@@ -141,7 +141,7 @@ def test_detached_propeller_is_removed():
         ({"frame_inertia": (0.27, 0.0, 0.42)}, "frame_inertia must be positive"),
         ({"payload": -1.0}, "payload must not be negative"),
         ({"driven": "belt"}, "unknown drive 'belt': choose one of torque, speed"),
-        ({"rotor_sign_x": (1, -1, 0, 1)}, r"must hold \+1 or -1"),
+        ({"rotor_sign_x": (1, -1, 0, 1)}, r"must contain \+1 or -1"),
     ],
 )
 def test_invalid_numbers_are_rejected(change, message):

@@ -79,7 +79,7 @@ def test_density_changes_real_flight_little():
 def test_invalid_effects_return_error():
     scene = load(HOVER)
     assert check_effects(scene, {"gravity": {}, "gravity_altitude": {}}).startswith(
-        "effects.gravity_altitude: excludes"
+        "effects.gravity_altitude: cannot be combined with"
     )
     assert check_effects(scene, {"wind_gust": {}}).startswith("effects.wind_gust.peak: ")
     assert check_effects(scene, scene[Effects].tables) == ""
