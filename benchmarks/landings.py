@@ -17,7 +17,7 @@ def main() -> None:
         "--kind",
         choices=list(DRAWS),
         default="random",
-        help="random landings, at steps, on folds of a grid, toppling, or with a strike of a propeller [default: random]",
+        help="random landings, at steps, on folds, toppling, or with a strike of a propeller [default: random]",
     )
     parser.add_argument("--first", type=int, default=0, help="number of the first landing [default: 0]")
     parser.add_argument("--count", type=int, default=200, help="number of landings [default: 200]")
