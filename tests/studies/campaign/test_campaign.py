@@ -277,7 +277,7 @@ def test_comparison_pairs_runs(complete, tmp_path):
     campaign(other, first, workers.run_here)
     code, output = run_lapwing("compare", folder.path, other.path, "--json", tmp_path / "d.json")
     assert (code, f"{RUNS} pairs of runs" in output) == (0, True)
-    assert "different: overrides\n" in output
+    assert "differences: overrides\n" in output
     assert "…" not in output  # no number is cut at 80 columns
     (row,) = [line.split() for line in output.splitlines() if line.split()[:1] == ["energy"]]
     assert row[:4] == ["energy", "[W", "h]", "*"]
