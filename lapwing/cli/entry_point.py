@@ -21,7 +21,7 @@ def main() -> None:
             carry_out()
         except Interrupted as interrupted:
             raise SystemExit(report_interrupt(interrupted)) from None
-        except Exception as error:
+        except Exception as error:  # an interrupt that Python has wrapped; all other errors are raised again
             if (cause := interrupt_behind(error)) is None:
                 raise
             raise SystemExit(report_interrupt(cause)) from None

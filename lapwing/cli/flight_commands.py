@@ -168,7 +168,7 @@ def import_(
     logs of the Crazyflie's uSD deck, and CSV files (.csv, .csv.gz) with --mapping.
     """
     from lapwing.studies.flight_import.log_flight import is_log
-    from lapwing.studies.flight_import.open_flight import open_flight, takes_mapping
+    from lapwing.studies.flight_import.open_flight import open_flight
     from lapwing.studies.flight_import.write_log import write_log
 
     check_distinct({"FLIGHT": flight, "--out": out})
@@ -179,8 +179,7 @@ def import_(
     check_log(out)
     claim(out)
     recording = open_flight(flight, mapping, vehicle)
-    if mapping is not None and not takes_mapping(flight):
-        raise ValueError(UNUSED_MAPPING.format(mapping, flight))
+    _check_mapping([flight], mapping)
     if not recording.valid.any():
         raise ValueError(f"{flight}: no valid sample; check the --mapping")
     write_log(out.resolve(), recording, flight.name)
@@ -204,10 +203,15 @@ def _horizons(text: str) -> tuple[int, ...]:
 
 
 def _check_flights(flights: list[Path], mapping: str | None) -> None:
-    from lapwing.studies.flight_import.open_flight import takes_mapping
-
     for path in flights:
         if not path.exists():
             raise ValueError(f"{path}: no such file; use the path of a recorded flight")
+    _check_mapping(flights, mapping)
+
+
+def _check_mapping(flights: list[Path], mapping: str | None) -> None:
+    """Raise ValueError if no file uses the mapping."""
+    from lapwing.studies.flight_import.open_flight import takes_mapping
+
     if mapping is not None and not any(map(takes_mapping, flights)):
         raise ValueError(UNUSED_MAPPING.format(mapping, flights[0]))

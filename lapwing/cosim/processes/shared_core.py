@@ -121,8 +121,11 @@ def process_tree(thread: int) -> list[int]:
     return result
 
 
-def cpu_time(pid: int) -> float:
-    """Return the CPU time [s] that a process has used, 0 if the system does not report it."""
+def total_cpu_time(pid: int) -> float:
+    """Return the CPU time [s] of a process with its ended threads, 0 if the system does not report it.
+
+    `cpu_starvation.cpu_time` is finer, but a thread that ends takes its time along.
+    """
     try:
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
@@ -208,7 +211,7 @@ class SharedCore:
     def _measure(self) -> None:
         """Store the busy times of the cores, and the CPU time of this thread and of all its programs."""
         self._busy, self._at = busy_times(), time.monotonic()
-        self._own = time.thread_time() + sum(map(cpu_time, process_tree(threading.get_native_id())[1:]))
+        self._own = time.thread_time() + sum(map(total_cpu_time, process_tree(threading.get_native_id())[1:]))
 
     def _move_program(self, *known: set[int]) -> None:
         """Bind the threads of the program to the core, except those whose affinity is not `known`."""

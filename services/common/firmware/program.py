@@ -14,7 +14,7 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from lapwing.cosim.processes.patience import Patience
-from lapwing.cosim.processes.shared_core import cpu_time, process_tree
+from lapwing.cosim.processes.shared_core import process_tree, total_cpu_time
 from lapwing.services.common.firmware.link import FirmwareError
 from lapwing.services.common.firmware.setup import FirmwareSetup
 
@@ -92,7 +92,7 @@ class Program:
 
     def cpu(self) -> float:
         """Return the CPU time [s] that it and its descendants use, or 0 if the system does not report it."""
-        return sum(map(cpu_time, process_tree(self.pid)))
+        return sum(map(total_cpu_time, process_tree(self.pid)))
 
     def close(self) -> None:
         """End the program and its children, and remove its temporary folder."""
