@@ -15,6 +15,7 @@ SETUP_FILE = "setup.json"
 MACHINE = ("python", "packages", "system", "processor")  # keys of the recording machine
 FAILURE, DIVERGED = "failure", "diverged"  # keys of a run that ended early: the reason, and whether it diverged
 
+_GIT_TIMEOUT = 60.0  # [s] a busy machine needs several seconds; a folder on a server may never answer
 WAITED = "waited_for_disk"  # key of a run that waited for the disk: the waiting time
 
 
@@ -83,7 +84,7 @@ def _processor() -> str:
 
 @cache
 def source_commit() -> str:
-    """Return the commit of the source tree, with "+" if files differ, or "unknown" outside a git checkout."""
+    """Return the commit of the source tree, with "+" if files differ, or "unknown" if git does not name one."""
     if stated := os.environ.get("LAPWING_COMMIT"):  # set in an image, which has no checkout
         return stated
     here = Path(__file__).parent
@@ -92,9 +93,9 @@ def source_commit() -> str:
             ["git", "-C", str(here), "describe", "--always", "--dirty=+", "--abbrev=12", "--exclude=*"],
             capture_output=True,
             text=True,
-            timeout=5,
+            timeout=_GIT_TIMEOUT,
             check=False,
         )
-    except OSError:
+    except (OSError, subprocess.TimeoutExpired):
         return "unknown"
     return result.stdout.strip() or "unknown"
