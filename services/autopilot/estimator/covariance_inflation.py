@@ -28,6 +28,7 @@ from lapwing.services.autopilot.estimator.filter_state import (
     Memory,
     Nominal,
     State,
+    correlate_warm_up,
 )
 
 _MOTION = 0.3  # [s] of rejected position and velocity before the IMU states are inflated
@@ -90,6 +91,7 @@ def reset_imu_biases(p: Estimator, s: State) -> State:
             s.memory.considered[k, :] = 0.0
     s.memory.considered[:SIZE, :MAG_SCALE] = 0.0
     s.memory.considered[:SIZE, LIFT:WIND] = 0.0
+    correlate_warm_up(p, s.memory, s.inertial.tick)
     nominal = Nominal(
         n.attitude, n.velocity_world, n.position_world, ZERO, ZERO, n.gps_correlated_error,
         n.magnetometer_bias, n.heading_bias, n.barometer_bias, n.sonar_scale,

@@ -10,6 +10,8 @@ from lapwing.kernels.simd import load, pack4, store, unpack4
 from lapwing.services.autopilot.estimator.filter_state import (
     ACCELEROMETER,
     CONSIDERED,
+    CONSIDERED_IN_CALM,
+    DRIFT,
     GYRO,
     GYRO_SCALE,
     LIFT,
@@ -19,7 +21,6 @@ from lapwing.services.autopilot.estimator.filter_state import (
     VARIANCE,
     VELOCITY,
     WANDER,
-    WIND_SQUARES,
     Memory,
     three,
 )
@@ -109,6 +110,13 @@ def _add_half(m: Memory, row: int, column: int, columns: Any) -> None:
 
 
 @always_inline
+def _add_half_of_drift(m: Memory, drift: float) -> None:
+    """Add half of J V for the biases of the gyroscopes, see `_add_half`; J is `drift` times the identity."""
+    for a in range(3):
+        m.considered[GYRO + a, DRIFT + a] += 0.5 * drift * m.considered[VARIANCE, DRIFT + a]
+
+
+@always_inline
 def _gyroscope_row(k: np.ndarray, j: int, turns: Any) -> Any:
     """Return row j of C^T J^T of the gyroscopes as a SIMD vector."""
     row = k[j]
@@ -124,18 +132,20 @@ def _accelerometer_row(k: np.ndarray, j: int, lifts: Any) -> Any:
 
 
 @always_inline
-def propagate_considered(m: Memory, omega: Vec3, f: Vec3, r: Mat3, dt: float) -> None:
-    """Propagate the covariance with the considered parameters, and add their effect on attitude and velocity.
+def propagate_considered(m: Memory, omega: Vec3, f: Vec3, r: Mat3, drift: float, dt: float) -> None:
+    """Propagate the covariance with the considered parameters, and add their effect on attitude, velocity and bias.
 
-    Call after `propagate_covariance`; `omega` is the rate [rad/s], f the specific force [m/s^2] in the world.
+    Call after `propagate_covariance`; `omega` is the rate [rad/s], f the specific force [m/s^2] in the world, `drift`
+    the fraction of the warm-up that happens in the interval.
     """
     c, k = m.covariance, m.considered
-    _transform_rows(k, CONSIDERED, 0, WIND_SQUARES, f, r, dt)
+    _transform_rows(k, CONSIDERED, 0, CONSIDERED_IN_CALM, f, r, dt)
     if considers_wind(m):
-        _transform_rows(k, CONSIDERED, WIND_SQUARES, CONSIDERED, f, r, dt)
+        _transform_rows(k, CONSIDERED, CONSIDERED_IN_CALM, CONSIDERED, f, r, dt)
     turns, lifts = _turns(omega, r, dt), _lifts(f, r, dt)
     _add_half(m, THETA, GYRO_SCALE, turns)
     _add_half(m, VELOCITY, LIFT, lifts)
+    _add_half_of_drift(m, drift)
     for j in range(POSITION, SIZE):
         store(c, SIZE * j + THETA, load(c, SIZE * j + THETA) + _gyroscope_row(k, j, turns))
         store(c, SIZE * j + VELOCITY, load(c, SIZE * j + VELOCITY) + _accelerometer_row(k, j, lifts))
@@ -151,8 +161,14 @@ def propagate_considered(m: Memory, omega: Vec3, f: Vec3, r: Mat3, dt: float) ->
     for i in range(POSITION):  # the sums round differently: keep it exactly symmetric
         for j in range(i):
             c[i, j] = c[j, i]
+    for i in range(SIZE):
+        for a in range(3):
+            change = drift * k[i, DRIFT + a]
+            c[i, GYRO + a] += change
+            c[GYRO + a, i] += change
     _add_half(m, THETA, GYRO_SCALE, turns)
     _add_half(m, VELOCITY, LIFT, lifts)
+    _add_half_of_drift(m, drift)
 
 
 @always_inline

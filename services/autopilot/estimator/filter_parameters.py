@@ -26,13 +26,15 @@ class Estimator(NamedTuple):
     position_std: Annotated[float, Gt(0)] = 10.0  # [m] above which the position counts as unknown
     attitude_std: Annotated[float, Gt(0)] = 0.1  # [rad] of the initial attitude
     gyro_bias_std: Annotated[float, Gt(0)] = 1.9e-3  # [rad/s] at the start
-    gyro_bias_walk: Annotated[float, Ge(0)] = 3.3e-5  # [rad/s/sqrt(s)], instability and warm-up
+    gyro_bias_walk: Annotated[float, Ge(0)] = 3.3e-6  # [rad/s/sqrt(s)], instability
+    gyro_warm_up_std: Annotated[float, Ge(0)] = 7e-4  # [rad/s] change of the bias by the warm-up after the start
+    gyro_warm_up_time: Annotated[float, Gt(0)] = 100.0  # [s] time constant of the warm-up
     gyro_scale_std: Annotated[float, Ge(0)] = 1e-3  # ratio, each axis
-    gyro_alignment_std: Annotated[float, Ge(0)] = 9e-4  # [rad] about each axis
+    gyro_alignment_std: Annotated[float, Ge(0)] = 8.7e-4  # [rad] about each axis
     accelerometer_bias_std: Annotated[float, Gt(0)] = 0.0295  # [m/s^2] at the start
     accelerometer_bias_walk: Annotated[float, Ge(0)] = 1e-4  # [m/s^2/sqrt(s)]
     accelerometer_scale_std: Annotated[float, Ge(0)] = 1e-3  # ratio, of the body's z axis
-    accelerometer_alignment_std: Annotated[float, Ge(0)] = 9e-4  # [rad] about the body's x and y axes
+    accelerometer_alignment_std: Annotated[float, Ge(0)] = 8.7e-4  # [rad] about the body's x and y axes
     static_pressure_error: tuple[float, float, float, float, float] = NO_STATIC_PRESSURE_ERROR
     """Share of the dynamic pressure in flight forwards, backwards, to the right, to the left and vertically."""
     wind_speed: Annotated[float, Ge(0)] = 10.0  # [m/s] expected 6 m above the ground, of unknown direction
@@ -40,7 +42,7 @@ class Estimator(NamedTuple):
     magnetometer_bias_std: Annotated[float, Ge(0)] = 5.1e-8  # [T] hard iron after calibration
     magnetometer_bias_walk: Annotated[float, Ge(0)] = 6e-10  # [T/sqrt(s)]
     magnetometer_scale_std: Annotated[float, Ge(0)] = 1e-3  # ratio, each axis
-    magnetometer_alignment_std: Annotated[float, Ge(0)] = 9e-4  # [rad] about each axis
+    magnetometer_alignment_std: Annotated[float, Ge(0)] = 8.7e-4  # [rad] about each axis
     sonar_scale_std: Annotated[float, Ge(0)] = 2e-3  # ratio, speed of sound
     sonar_half_beam_deg: Annotated[float, Ge(0), Lt(90)] = 10.0
     sonar_height_max: Annotated[float, Ge(0)] = 5.0  # [m] above which the sonar is not used

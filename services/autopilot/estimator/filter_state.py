@@ -16,9 +16,11 @@ from lapwing.services.common.ports import StateEstimate
 SIZE = 24
 THETA, VELOCITY, POSITION, GYRO, ACCELEROMETER, WANDER, IRON = 0, 3, 6, 9, 12, 15, 18
 HEADING, BAROMETER, SCALE = 21, 22, 23
-CONSIDERED = 20  # errors of instruments that are considered and not estimated (theory.md, eqs. (3.60) and (3.67))
+CONSIDERED = 24  # errors of instruments that are considered and not estimated (theory.md, eqs. (3.60) and (3.67))
 GYRO_SCALE, GYRO_ALIGNMENT, MAG_SCALE, MAG_ALIGNMENT, LIFT = 0, 3, 6, 9, 11  # LIFT: accelerometers, eq. (3.66)
-WIND, WIND_SQUARES, GUST = 14, 16, 18  # static pressure error, eq. (3.67); column 19 is empty
+DRIFT = 14  # warm-up of the gyroscopes, eq. (3.69)
+WIND, WIND_SQUARES, GUST = 17, 19, 21  # static pressure error, eq. (3.67); columns 22 and 23 are empty
+CONSIDERED_IN_CALM = 20  # columns of a filter without static pressure error, in groups of four
 # Rows of `considered`: variances, row of H, covariance with the innovation
 VARIANCE, ROW, PRODUCT = SIZE, SIZE + 1, SIZE + 2
 
@@ -68,7 +70,7 @@ class Memory(NamedTuple):
     correction: np.ndarray  # (24,) pending correction of the estimate
     row: np.ndarray  # (24,) of the measurement matrix
     product: np.ndarray  # (24,) covariance times row
-    considered: np.ndarray  # (27, 20) covariance of the error with these parameters; then VARIANCE, ROW, PRODUCT
+    considered: np.ndarray  # (27, 24) covariance of the error with these parameters; then VARIANCE, ROW, PRODUCT
     history: np.ndarray  # (HISTORY, 8) velocity_gain, distance_gain, noise added to velocity and attitude
     since: np.ndarray  # (WATCHED,) ticks since a source was last accepted, or NEVER
     rejected: np.ndarray  # (WATCHED,) 1 if the last reading of a source was rejected
@@ -120,6 +122,19 @@ def new_memory() -> Memory:
     )
 
 
+@always_inline
+def warm_up_left(p: Estimator, tick: int) -> float:
+    """Return the fraction of the gyroscopes' warm-up that is still to come."""
+    return math.exp(-p.interval * tick / p.gyro_warm_up_time)
+
+
+@always_inline
+def correlate_warm_up(p: Estimator, m: Memory, tick: int) -> None:
+    """Correlate unknown biases of the gyroscopes, which contain the rest of the warm-up, with its amplitude."""
+    for k in range(3):
+        m.considered[GYRO + k, DRIFT + k] = -warm_up_left(p, tick) * m.considered[VARIANCE, DRIFT + k]
+
+
 @kernel
 def initial(p: Estimator, m: Memory, position_world: Vec3, specific_force_body: Vec3, field_body: Vec3) -> State:
     """Return the state of a vehicle at rest.
@@ -159,6 +174,8 @@ def initial(p: Estimator, m: Memory, position_world: Vec3, specific_force_body: 
     alignment = p.accelerometer_alignment_std * p.accelerometer_alignment_std
     m.considered[VARIANCE, LIFT : LIFT + 2] = alignment
     m.considered[VARIANCE, LIFT + 2] = p.accelerometer_scale_std * p.accelerometer_scale_std
+    m.considered[VARIANCE, DRIFT : DRIFT + 3] = p.gyro_warm_up_std * p.gyro_warm_up_std
+    correlate_warm_up(p, m, 0)
     if p.static_pressure_error != NO_STATIC_PRESSURE_ERROR and p.wind_speed > 0.0:
         square = p.wind_speed * p.wind_speed
         m.considered[VARIANCE, WIND : WIND + 2] = 0.5 * square

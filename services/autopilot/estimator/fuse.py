@@ -46,6 +46,7 @@ def innovation_variance(m: Memory, variance: float) -> float:
     second = load(m.considered, CONSIDERED * ROW + 4) * load(m.considered, CONSIDERED * VARIANCE + 4)
     third = load(m.considered, CONSIDERED * ROW + 8) * load(m.considered, CONSIDERED * VARIANCE + 8)
     fourth = load(m.considered, CONSIDERED * ROW + 12) * load(m.considered, CONSIDERED * VARIANCE + 12)
+    fifth = load(m.considered, CONSIDERED * ROW + 16) * load(m.considered, CONSIDERED * VARIANCE + 16)
     for j in range(SIZE):
         h = m.row[j]
         if h != 0.0:
@@ -53,15 +54,17 @@ def innovation_variance(m: Memory, variance: float) -> float:
             second = second + h * load(m.considered, CONSIDERED * j + 4)
             third = third + h * load(m.considered, CONSIDERED * j + 8)
             fourth = fourth + h * load(m.considered, CONSIDERED * j + 12)
+            fifth = fifth + h * load(m.considered, CONSIDERED * j + 16)
     store(m.considered, CONSIDERED * PRODUCT, first)
     store(m.considered, CONSIDERED * PRODUCT + 4, second)
     store(m.considered, CONSIDERED * PRODUCT + 8, third)
     store(m.considered, CONSIDERED * PRODUCT + 12, fourth)
+    store(m.considered, CONSIDERED * PRODUCT + 16, fifth)
     if considers_wind(m):
-        fifth = load(m.considered, CONSIDERED * ROW + 16) * load(m.considered, CONSIDERED * VARIANCE + 16)
+        sixth = load(m.considered, CONSIDERED * ROW + 20) * load(m.considered, CONSIDERED * VARIANCE + 20)
         for j in range(SIZE):
-            fifth = fifth + m.row[j] * load(m.considered, CONSIDERED * j + 16)
-        store(m.considered, CONSIDERED * PRODUCT + 16, fifth)
+            sixth = sixth + m.row[j] * load(m.considered, CONSIDERED * j + 20)
+        store(m.considered, CONSIDERED * PRODUCT + 20, sixth)
     total = variance + FLOOR
     for k in range(CONSIDERED):
         g = m.considered[ROW, k]
@@ -100,17 +103,19 @@ def apply_update(m: Memory, innovation: float, s: float) -> float:
     second = load(m.considered, CONSIDERED * PRODUCT + 4) * inverse
     third = load(m.considered, CONSIDERED * PRODUCT + 8) * inverse
     fourth = load(m.considered, CONSIDERED * PRODUCT + 12) * inverse
+    fifth = load(m.considered, CONSIDERED * PRODUCT + 16) * inverse
     for i in range(SIZE):
         gain, offset = m.product[i], CONSIDERED * i
         store(m.considered, offset, load(m.considered, offset) - gain * first)
         store(m.considered, offset + 4, load(m.considered, offset + 4) - gain * second)
         store(m.considered, offset + 8, load(m.considered, offset + 8) - gain * third)
         store(m.considered, offset + 12, load(m.considered, offset + 12) - gain * fourth)
+        store(m.considered, offset + 16, load(m.considered, offset + 16) - gain * fifth)
     if considers_wind(m):
-        fifth = load(m.considered, CONSIDERED * PRODUCT + 16) * inverse
+        sixth = load(m.considered, CONSIDERED * PRODUCT + 20) * inverse
         for i in range(SIZE):
-            offset = CONSIDERED * i + 16
-            store(m.considered, offset, load(m.considered, offset) - m.product[i] * fifth)
+            offset = CONSIDERED * i + 20
+            store(m.considered, offset, load(m.considered, offset) - m.product[i] * sixth)
     return y * y * inverse
 
 

@@ -19,6 +19,7 @@ from lapwing.services.autopilot.estimator.filter_state import (
     Inertial,
     Nominal,
     State,
+    warm_up_left,
 )
 from lapwing.services.autopilot.estimator.measurement_checks import is_stuck
 from lapwing.services.autopilot.estimator.static_pressure import decorrelate_gusts
@@ -133,7 +134,8 @@ def predict(
 
     c, force_mean = m.covariance, scale(0.5, add(f0, f1))
     propagate_covariance(c, force_mean, r, dt)
-    propagate_considered(m, omega_mean, force_mean, r, dt)
+    drift = warm_up_left(p, i.tick) - warm_up_left(p, tick)
+    propagate_considered(m, omega_mean, force_mean, r, drift, dt)
     keep = math.exp(-dt / p.gps_correlation_time)
     fade(m, keep)
     decorrelate_gusts(p, s)

@@ -6,10 +6,9 @@ from lapwing.services.autopilot.estimator.filter_parameters import Estimator
 from lapwing.services.autopilot.estimator.filter_state import GYRO, HISTORY, VELOCITY, State, apply_correction
 from lapwing.services.autopilot.estimator.fuse import acceleration_row, clear, fuse
 
-_VELOCITY_VARIANCE = 0.01 * 0.01  # [(m/s)^2] compliance of the feet
-_OMEGA_VARIANCE = 1e-3 * 1e-3  # [(rad/s)^2]
-_ACCELERATION_VARIANCE = 0.02 * 0.02  # [(m/s^2)^2]
+_ARM = 0.7  # [m] from the feet to the instruments while the vehicle rocks on them
 _VIBRATION_READINGS = 64  # readings for the variance of the vibration at rest
+_GROWTH = 20.0  # [intervals] in which motion between the readings changes the estimated velocity
 
 
 @kernel
@@ -47,17 +46,22 @@ def update_standstill(p: Estimator, s: State, omega_variance: float, specific_fo
         specific_force_variance: [(m/s^2)^2] of that reading.
     """
     n, i, m = s.nominal, s.inertial, s.memory
-    r = rotation_matrix(n.attitude)
+    r, dt = rotation_matrix(n.attitude), p.interval
+    shake = (
+        shake_variance(p, s, 0, specific_force_variance),
+        shake_variance(p, s, 1, specific_force_variance),
+        shake_variance(p, s, 2, specific_force_variance),
+    )
+    rocking = 0.5 * (shake[0] + shake[1]) * math.square(dt / _ARM)
     for axis in range(3):
         clear(m)
         m.row[VELOCITY + axis] = 1.0
-        fuse(m, -n.velocity_world[axis], _VELOCITY_VARIANCE)
+        fuse(m, -n.velocity_world[axis], _GROWTH * shake[axis] * (dt * dt))
         clear(m)
         m.row[GYRO + axis] = 1.0
-        fuse(m, i.omega[axis] - n.gyro_bias[axis], omega_variance + _OMEGA_VARIANCE)
+        fuse(m, i.omega[axis] - n.gyro_bias[axis], omega_variance + (0.0 if axis == 2 else rocking))
         clear(m)
         acceleration_row(m, i.force_world, r, axis, 1.0)
         acceleration = i.force_world[axis] - (p.gravity if axis == 2 else 0.0)
-        vibration = max(shake_variance(p, s, axis, specific_force_variance), _ACCELERATION_VARIANCE)
-        fuse(m, -acceleration, specific_force_variance + vibration)
+        fuse(m, -acceleration, specific_force_variance + shake[axis])
     return apply_correction(s)

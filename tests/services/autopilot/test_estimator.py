@@ -117,15 +117,33 @@ def test_considered_propagation_against_dense_matrices():
     for k, (stretch, angles) in enumerate([((0, 0, 0), (0, 1, 0)), ((0, 0, 0), (-1, 0, 0)), ((0, 0, 1), (0, 0, 0))]):
         matrix = scale_and_misalignment(1.0, 1.0, tuple(map(float, stretch)), tuple(map(float, angles)))
         a[3:6, filter_state.SIZE + filter_state.LIFT + k] = -r @ (np.reshape(matrix, (3, 3)) - np.eye(3)) @ lift
+    drift = 0.004
+    for k in range(3):
+        a[filter_state.GYRO + k, filter_state.SIZE + filter_state.DRIFT + k] = drift / dt
     transition = np.eye(n) + dt * a
     expected = transition @ joint @ transition.T
     propagate_covariance(m.covariance, tuple(f), tuple(r.ravel()), dt)
-    propagate_considered(m, tuple(omega), tuple(f), tuple(r.ravel()), dt)
+    propagate_considered(m, tuple(omega), tuple(f), tuple(r.ravel()), drift, dt)
     np.testing.assert_allclose(m.covariance, expected[: filter_state.SIZE, : filter_state.SIZE], atol=1e-13)
     np.testing.assert_allclose(
         m.considered[: filter_state.SIZE], expected[: filter_state.SIZE, filter_state.SIZE :], atol=1e-13
     )
     np.testing.assert_array_equal(m.covariance, m.covariance.T)
+
+
+def test_warm_up_of_gyroscopes_against_closed_form():
+    """The bias is b_0 - c exp(-t/T) with known T: at first c is a part of the unknown bias, in the end it has gone."""
+    p = P._replace(gyro_bias_walk=0.0, gyro_warm_up_time=2.0)
+    s = at_rest(p=p)
+    turn_on = p.gyro_bias_std**2 - p.gyro_warm_up_std**2
+    for tick in range(1, 2001):
+        s = estimator.predict(p, s, ZERO, (0.0, 0.0, p.gravity), 0.0, 0.0, True)
+        if tick in (1, 500, 2000):
+            left = np.exp(-tick * p.interval / p.gyro_warm_up_time)
+            variance = np.diag(s.memory.covariance)[filter_state.GYRO :][:3]
+            np.testing.assert_allclose(variance, turn_on + (left * p.gyro_warm_up_std) ** 2, rtol=1e-9)
+            joint = s.memory.considered[filter_state.GYRO :, filter_state.DRIFT :][:3, :3]
+            np.testing.assert_allclose(joint, -left * p.gyro_warm_up_std**2 * np.eye(3), atol=1e-18)
 
 
 def test_considered_update_against_joseph_form():
@@ -282,6 +300,7 @@ def textbook():
         gyro_alignment_std=0.0,
         gyro_bias_std=1.75e-3,
         gyro_bias_walk=2.28e-6,
+        gyro_warm_up_std=0.0,
         accelerometer_bias_std=0.0294,
         accelerometer_bias_walk=3.6e-5,
         accelerometer_scale_std=0.0,
@@ -304,7 +323,7 @@ def test_ideal_instruments_cause_no_estimate_error():
     assert not flight.health.any()
 
 
-SETTLED = slice(60, None)  # the zero-velocity update has larger variances than necessary
+SETTLED = slice(30, None)  # in flight
 DEGREES = {
     filter_state.GPS: 3,
     filter_state.GPS_VELOCITY: 3,

@@ -124,7 +124,7 @@ def test_flight_continues_on_optical_flow_without_gps():
     assert not any("position is lost" in text for text in sent_texts(seeing))
     assert mode(seeing, 24.0) == "hold"
     assert math.dist(place(seeing, 24.0), place(seeing, 9.0)) < 1.5
-    blind = fly_by_sensors(18, script, ENABLED)
+    blind = fly_by_sensors(24, script, ENABLED)
     assert any("position is lost" in text for text in sent_texts(blind))
     assert error(seeing, 9.0) < 0.5 * error(blind, 9.0)
 
