@@ -176,7 +176,7 @@ def test_maximum_height_ends_trajectory_of_scene():
 
 def test_trajectory_ends_when_position_returns_without_operator():
     soon = "autopilot.parameters.COM_POS_FS_DELAY=0.5"
-    flight = fly(20, {}, *SENSORS, GPS_LOST % (3.0, 4.3), soon, operated=False)
+    flight = fly(20, {}, *SENSORS, GPS_LOST % (3.0, 4.0), soon, operated=False)
     modes = [name for name, _ in groupby(flight.column("status", lambda m: m.mode))]
     assert modes == ["mission", "descend", "land", "hold"]
     assert height(flight, 20.0) == pytest.approx(0.35, abs=0.05)
