@@ -28,7 +28,7 @@ PARTS = {
     "graph": (lapwing.studies.simulate, "BlockDiagram"),
     FLIGHT: (BlockDiagram, "advance"),
     "rows as columns": (FlightData, "of_each"),
-    "figures": (campaign_runs, "figures"),
+    "metrics": (campaign_runs, "metrics"),
 }
 """Parts of a run: name and functions."""
 

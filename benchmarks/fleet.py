@@ -68,14 +68,15 @@ def main(most=32):
 def scene(n, path):
     """Write a scene of n vehicles. Return its path."""
     entries = [
-        f'[[vehicle]]\nairframe = "quad_x"\nstart = [{APART * (i // ROW)}, {APART * (i % ROW)}]\n' for i in range(n)
+        f'[[vehicle]]\nairframe = "quad_x"\ninitial_position = [{APART * (i // ROW)}, {APART * (i % ROW)}]\n'
+        for i in range(n)
     ]
     path.write_text(COMMON + "".join(entries))
     return path
 
 
 def per_second(flight):
-    """Return processor time per simulated second; `fly` flies for a duration [s] and returns its processor time [s]."""
+    """Return processor time per simulated second; `flight` returns the processor time [s] of a duration [s]."""
     return (flight(LONG) - flight(BRIEF)) / (LONG - BRIEF)
 
 

@@ -15,9 +15,7 @@ class Mission(NamedTuple):
     """Target and end of a mission."""
 
     target: tuple[float, float, float] | None  # [m] world, position at the end; None if unknown before the flight
-    final_phase: str | None = (
-        None  # last phase of a trajectory that ends in the air; None for missions that end with a landing
-    )
+    final_phase: str | None = None  # last phase of a trajectory that ends in the air; None if it ends with a landing
     is_longer: bool = False  # True if the run ends before the trajectory
 
     def completion(self, status: TopicView) -> str:

@@ -72,7 +72,7 @@ def pages():
             outcome_text=HOSTILE,
             failure=failure,
             facts={HOSTILE: HOSTILE},
-            heads=[HOSTILE],
+            labels=[HOSTILE],
             worst=[row],
             vehicles={HOSTILE: [HOSTILE]},
             vehicle_heads=[HOSTILE],

@@ -68,10 +68,7 @@ def compare(one: Path, other: Path) -> Comparison:
                 differences.append(Difference(name, *means, paired_difference(x[is_finite], y[is_finite])))
     count = len(pairs)
     failures = interval(int(count - success_a.sum()), count), interval(int(count - success_b.sum()), count)
-    only_first, only_second = (
-        int(((success_a == 1) & (success_b == 0)).sum()),
-        int(((success_a == 0) & (success_b == 1)).sum()),
-    )
+    only_first, only_second = int((success_a < success_b).sum()), int((success_b < success_a).sum())
     total = len(set(_pairs(a)) | set(_pairs(b)))
     keys = [key for key in a.folder.plan.keys if key in b.folder.plan.keys]
     different_values = [
@@ -79,7 +76,7 @@ def compare(one: Path, other: Path) -> Comparison:
     ]
     differing = [name for name in PLAN_ENTRIES if a.folder.about[name] != b.folder.about[name]] + different_values
     return Comparison(
-        (str(one), str(other)), differing, count, total - count, failures, only_second, only_first, differences
+        (str(one), str(other)), differing, count, total - count, failures, only_first, only_second, differences
     )
 
 

@@ -121,7 +121,7 @@ def _random_bits(seed: int, run: int, key: str) -> int:
 
 
 def _random_unit(seed: int, run: int, key: str) -> float:
-    """Return a number in (0, 1). See `_word`."""
+    """Return a number in (0, 1). See `_random_bits`."""
     return ((_random_bits(seed, run, key) >> 12) + 0.5) * 2.0**-52
 
 

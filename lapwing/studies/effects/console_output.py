@@ -90,9 +90,7 @@ def plot(path: Path, study: Study) -> None:
         influence, cost = figure.subplots(1, 2, sharey=True)
         distances = [row.influence.trajectory for row in rows if row.influence]
         longest = max([e for e in distances if math.isfinite(e)] + [10.0 * study.within])
-        lengths = [
-            min(max(e, MIN_BAR), 3.0 * longest) if e > 0.0 else 0.0 for e in distances
-        ]  # no bar without a change
+        lengths = [min(max(e, MIN_BAR), 3.0 * longest) if e > 0.0 else 0.0 for e in distances]
         colours = [FLOWN if row.active else "#9CC3DD" for row in rows]
         influence.barh(names, lengths, color=colours)
         influence.axvline(study.within, color=BOUND, linewidth=1.2, label=f"tolerance {study.within:g} m")

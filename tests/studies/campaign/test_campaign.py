@@ -256,6 +256,7 @@ def test_report_json_and_repeated_run(complete, tmp_path, monkeypatch):
     assert (reported["runs"], len(reported["failed"]), reported["digest"]) == (RUNS, RUNS - successes, digest)
     page = page_text(folder.path / "report.html")
     assert all(text in page for text in ("Probability of success", "Sensitivities", "normal(10.4, 0.3)"))
+    assert all(f">{head}</th>" in page for head in ("max_distance [m]", "touchdown.speed [m/s]", "max_tilt [°]"))
     worst = Results(folder).worst(1)[0]["run"]
     command = f"lapwing run {SCENE} --run {worst} --campaign {folder.path}"
     assert command in page

@@ -141,9 +141,8 @@ def draw_strike(seed: int) -> Landing:
 DRAWS: dict[str, Callable[[int], Landing]] = {
     "random": draw, "steps": draw_step, "folds": draw_fold, "toppling": draw_toppling, "strikes": draw_strike,
 }  # fmt: skip
-FASTEST = Landing(
-    (0.0, 0.0), 0.0, 3.0, (2.0, 0.0), (0.5, 0.0, 0.0), 0.0, (10.0, 10.0, 10.0), 300.0
-)  # fastest motion after bounces
+# fastest motion after bounces
+FASTEST = Landing((0.0, 0.0), 0.0, 3.0, (2.0, 0.0), (0.5, 0.0, 0.0), 0.0, (10.0, 10.0, 10.0), 300.0)
 
 
 def plant(case: Landing) -> tuple[MultirotorParameters, MultirotorState]:

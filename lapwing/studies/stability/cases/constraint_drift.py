@@ -59,30 +59,16 @@ def run() -> CaseResult:
     """Measure the hinge defects after every minute of an hour."""
     drift = {name: defects(method) for name, method in METHODS.items()}
     rows = [
-        Row(
-            name,
-            f"{name}, RK4 at 6 ms",
-            "largest defect of any hinge in an hour [m, rad, m/s, rad/s]",
-            BOUND,
-            WHY,
-            float(drift[name].max()),
-            "no stabilisation",
-            float(np.nanmax(drift["none"])),
-        )
+        Row(name, f"{name}, RK4 at 6 ms", "largest defect of any hinge in an hour [m, rad, m/s, rad/s]", BOUND, WHY,
+            float(drift[name].max()), "no stabilisation", float(np.nanmax(drift["none"])))
         for name in ("projection", "partitioning")
-    ]
+    ]  # fmt: skip
     rows.append(
-        Row(
-            "baumgarte",
-            "Baumgarte stabilisation at 50/s, RK4 at 2 ms",
-            "hinge error [m, rad] after an hour",
+        Row("baumgarte", "Baumgarte stabilisation at 50/s, RK4 at 2 ms", "hinge error [m, rad] after an hour",
             2.0 * plant_hinge_error("baumgarte", 60.0),
             "twice the error after a minute: feedback leaves the method's error, which must not grow",
-            plant_hinge_error("baumgarte", 3600.0),
-            "no stabilisation",
-            plant_hinge_error("none", 3600.0),
-        )
-    )
+            plant_hinge_error("baumgarte", 3600.0), "no stabilisation", plant_hinge_error("none", 3600.0))
+    )  # fmt: skip
     t = np.arange(1, MINUTES + 1)
     curves = [Curve(name, t, np.maximum(values, 1e-17)) for name, values in drift.items()]
     return CaseResult(rows, Plot("time [min]", "largest defect", curves, BOUND))

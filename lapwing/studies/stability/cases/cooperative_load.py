@@ -122,36 +122,14 @@ def run() -> CaseResult:
         light = name == "light_load"
         method = f"{ADAPTIVE} on TS^2, tolerance {TOLERANCE:g}" if light else "rkmk4 on TS^2, 0.5 ms"
         bound, why = (LIGHT_BOUND, LIGHT_WHY) if light else (ENERGY_BOUND, ENERGY_WHY)
-        (off, energy), (baseline_off, baseline_energy) = (
-            link_and_energy_errors(name, ADAPTIVE if light else "rkmk4"),
-            baseline_errors(name, STEPS // 10),
-        )
-        links, change = (
-            "error of the link length, relative",
-            "change of the energy, relative to the initial kinetic energy",
-        )
+        off, energy = link_and_energy_errors(name, ADAPTIVE if light else "rkmk4")
+        baseline_off, baseline_energy = baseline_errors(name, STEPS // 10)
         result += [
-            Row(
-                f"{name}.links",
-                method,
-                links,
-                LINK_BOUND,
-                LINK_WHY,
-                float(off.max()),
-                spring,
-                largest_finite(baseline_off),
-            ),
-            Row(
-                f"{name}.energy",
-                method,
-                change,
-                bound,
-                why,
-                float(energy.max()),
-                spring,
-                largest_finite(baseline_energy),
-            ),
-        ]
+            Row(f"{name}.links", method, "error of the link length, relative", LINK_BOUND, LINK_WHY, float(off.max()),
+                spring, largest_finite(baseline_off)),
+            Row(f"{name}.energy", method, "change of the energy, relative to the initial kinetic energy", bound, why,
+                float(energy.max()), spring, largest_finite(baseline_energy)),
+        ]  # fmt: skip
         curves += [Curve(name, t, np.maximum(energy, 1e-17)), Curve(f"{name}, springs", t, baseline_energy)]
     return CaseResult(result, Plot("time [s]", "change of the energy", curves, ENERGY_BOUND))
 

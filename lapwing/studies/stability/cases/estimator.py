@@ -130,32 +130,16 @@ def run() -> CaseResult:
             baseline, label = "heading of the magnetometer", np.pi / o.angle_std[before]
         invariant = "largest error over its standard deviation, while the health is good"
         rows.append(
-            Row(
-                name,
-                "error-state filter with gates and health",
-                invariant,
-                SIGMAS,
-                WHY,
-                float(o.ratio[o.healthy].max()),
-                baseline,
-                label,
-            )
-        )
+            Row(name, "error-state filter with gates and health", invariant, SIGMAS, WHY,
+                float(o.ratio[o.healthy].max()), baseline, label)
+        )  # fmt: skip
         curves.append(Curve(name, o.t, np.maximum(o.ratio, 1e-3)))
     min_eigenvalue = min(o.min_eigenvalue for o in outcomes.values())
     why = "a covariance has no negative eigenvalue"
     method = "sequential updates of a symmetric covariance"
     invariant = "negative part of the smallest eigenvalue of the correlations"
     rows.append(
-        Row(
-            "covariance",
-            method,
-            invariant,
-            0.0,
-            why,
-            max(0.0, -min_eigenvalue),
-            "P = (1 - K H) P",
-            max(0.0, -textbook_eigenvalue()),
-        )
-    )
+        Row("covariance", method, invariant, 0.0, why, max(0.0, -min_eigenvalue), "P = (1 - K H) P",
+            max(0.0, -textbook_eigenvalue()))
+    )  # fmt: skip
     return CaseResult(rows, Plot("time [s]", "error over its standard deviation", curves, SIGMAS))

@@ -89,42 +89,23 @@ def run() -> CaseResult:
     ours, baseline = "correction at the time of the fix", "correction at the time of arrival, entire flight"
     outcomes = {name: fly({}, extra) for name, extra in CASES}
     rows = [
-        Row(
-            name,
-            ours,
-            invariant,
-            SIGMAS,
-            WHY,
-            worst(outcomes[name]),
-            baseline,
-            float(fly({}, extra, ignore_age=True).ratio.max()),
-        )
+        Row(name, ours, invariant, SIGMAS, WHY, worst(outcomes[name]), baseline,
+            float(fly({}, extra, ignore_age=True).ratio.max()))
         for name, extra in CASES
-    ]
+    ]  # fmt: skip
     rows.append(
-        Row(
-            "odd_rates",
-            "rejection with the key and the possible rates",
-            f"accepted rates that do not divide the tick rate, of {len(INDIVISIBLE_RATES)}",
-            0.0,
+        Row("odd_rates", "rejection with the key and the possible rates",
+            f"accepted rates that do not divide the tick rate, of {len(INDIVISIBLE_RATES)}", 0.0,
             "none: messages are due at integer ticks",
             float(sum(not is_rejected(override) for override in INDIVISIBLE_RATES)),
-            "schedule by floating-point modulo, one hour",
-            float(modulo_errors(25, 900_000)),
-        )
-    )
+            "schedule by floating-point modulo, one hour", float(modulo_errors(25, 900_000)))
+    )  # fmt: skip
     rows.append(
-        Row(
-            "jumping_clock",
-            "lock step: time from the tick count",
+        Row("jumping_clock", "lock step: time from the tick count",
             "commands that differ from a single-process flight; the autopilot's clocks jump 2 to 20 times per second",
-            0.0,
-            "none: the flight does not depend on process clocks",
-            float(differing_commands()),
-            "intervals from the wall clock",
-            float(wall_clock_errors(1000, 0.004)),
-        )
-    )
+            0.0, "none: the flight does not depend on process clocks", float(differing_commands()),
+            "intervals from the wall clock", float(wall_clock_errors(1000, 0.004)))
+    )  # fmt: skip
     curves = [Curve(name, o.t, np.maximum(o.ratio, 1e-3)) for name, o in outcomes.items()]
     return CaseResult(rows, Plot("time [s]", "error over its standard deviation", curves, SIGMAS))
 

@@ -43,18 +43,10 @@ def run() -> CaseResult:
     """Measure the hinge defects over two seconds."""
     drift = {name: defects(method, SCALE, SPEED, STEP, SAMPLES) for name, method in METHODS.items()}
     rows = [
-        Row(
-            name,
-            f"{name}, RK4 at 0.25 ms",
-            "largest defect of any hinge in 2 s [m, rad, m/s, rad/s]",
-            BOUND,
-            WHY,
-            float(drift[name].max()),
-            "no stabilisation",
-            float(np.nanmax(drift["none"])),
-        )
+        Row(name, f"{name}, RK4 at 0.25 ms", "largest defect of any hinge in 2 s [m, rad, m/s, rad/s]", BOUND, WHY,
+            float(drift[name].max()), "no stabilisation", float(np.nanmax(drift["none"])))
         for name in ("projection", "partitioning")
-    ]
+    ]  # fmt: skip
     t = STEPS_PER_SAMPLE * STEP * np.arange(1, SAMPLES + 1)
     curves = [Curve(name, t, np.maximum(values, 1e-17)) for name, values in drift.items()]
     return CaseResult(rows, Plot("time [s]", "largest defect", curves, BOUND))

@@ -64,10 +64,8 @@ def release_errors() -> tuple[float, float, float, float]:
     steps = round(SWING / STEP) * 5
     y = rows("rkmk4", p, x, SWING, steps, steps // 5)
     position, velocity = bodies(LENGTH, y)
-    before, size = (
-        conserved_quantities(position[-1], velocity[-1]),
-        np.abs(conserved_quantities(position[-1], np.abs(velocity[-1]))),
-    )
+    before = conserved_quantities(position[-1], velocity[-1])
+    size = np.abs(conserved_quantities(position[-1], np.abs(velocity[-1])))
     free, state = release(p, unflatten(x, tuple(map(float, y[-1]))))
     r = np.array([state.load_position, *state.quad_position])
     v = np.array([state.load_velocity, *state.quad_velocity])
@@ -118,11 +116,8 @@ def unreported() -> tuple[float, float]:
     """Return 1 if the event, and 1 if the link length, does not show a compressed link of a flight; else 0."""
     flight = fly("cooperative_load", [PUSHING], (TRUTH, BODIES, LIFT))
     reported = any(event.kind == "slack" for event in flight.events)
-    place, length = (
-        flight.topic("body_states").position,
-        np.array(flight.origin.scene["cooperative_load"]["link_length"]),
-    )
-    off = np.abs(np.linalg.norm(place[:, :1] - place[:, 1:], axis=2) / length - 1.0).max()
+    place, length = flight.topic("body_states").position, flight.origin.scene["cooperative_load"]["link_length"]
+    off = np.abs(np.linalg.norm(place[:, :1] - place[:, 1:], axis=2) / np.array(length) - 1.0).max()
     return float(not reported), float(off < 1e-9)
 
 
