@@ -19,9 +19,9 @@ CAMPAIGN = [*LAPWING, "campaign", "hover", "--set", "run.duration=2", "--workers
 def main(most=10000):
     counts, cost = [10**k for k in range(2, 9) if 10**k <= most], {}
     with tempfile.TemporaryDirectory() as folder:
-        taken([*CAMPAIGN, "--runs", "1", "--out", f"{folder}/warm"])
+        measure_command([*CAMPAIGN, "--runs", "1", "--out", f"{folder}/warm"])
         for runs in counts:
-            cost[runs] = taken([*CAMPAIGN, "--runs", str(runs), "--out", f"{folder}/{runs}"])
+            cost[runs] = measure_command([*CAMPAIGN, "--runs", str(runs), "--out", f"{folder}/{runs}"])
             print(f"{runs:9} runs: {cost[runs][0]:8.1f} s, {cost[runs][1]:5.0f} MB", flush=True)
     each = [(cost[b][0] - cost[a][0]) / (b - a) for a, b in pairwise(counts)]  # [s] for every further run
     for runs, further in zip(counts[1:], each, strict=True):
@@ -33,7 +33,7 @@ def main(most=10000):
     return show(result)
 
 
-def taken(command):
+def measure_command(command):
     """Return processor time [s] and peak memory [MB] of a command."""
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     _, status, usage = os.wait4(process.pid, 0)

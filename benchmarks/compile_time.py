@@ -23,7 +23,7 @@ GROUPS = (
 )
 
 
-def taken(environment, call):
+def processor_time(environment, call):
     """Return the processor time [s] of a process with this call."""
     code = f"import time, lapwing; lapwing.{call}; print(time.process_time())"
     return float(subprocess.check_output([sys.executable, "-c", code], env=environment, text=True).splitlines()[-1])
@@ -33,7 +33,7 @@ def rows():
     for group in GROUPS:
         with empty_cache() as environment:
             for name, call, bar in group:
-                yield Row(f"{name}, processor time", taken(environment, call), "s", bar)
+                yield Row(f"{name}, processor time", processor_time(environment, call), "s", bar)
 
 
 def main():

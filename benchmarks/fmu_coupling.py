@@ -100,7 +100,7 @@ def coupled(setup: RunConfig, paths: dict[str, Path], jacobi: bool, ticks: int) 
     return np.array(rows)
 
 
-def flown(scene: str, settings: list[str], coupling: str) -> np.ndarray:
+def lapwing_positions(scene: str, settings: list[str], coupling: str) -> np.ndarray:
     return np.array(fly(load(scene, [*settings, f"communication.coupling={coupling}"]), (TRUTH,)).truth.position)
 
 
@@ -120,12 +120,12 @@ def main(scene: str, *rates: str) -> None:
         step = 1.0 / (FINEST * max(chosen))  # equal for all rates
         return [*noise_overrides(loaded), *rate_overrides(loaded, rate), f"solver.step={step!r}"]
 
-    finest = flown(scene, settings(FINEST * max(chosen)), "gauss_seidel")
+    finest = lapwing_positions(scene, settings(FINEST * max(chosen)), "gauss_seidel")
     print("| rate | FMPy Gauss-Seidel to `lapwing run` | FMPy Jacobi to `lapwing run` with Jacobi |", end="")
     print(" Gauss-Seidel to finest | Jacobi to Gauss-Seidel |\n|---|---|---|---|---|")
     for rate in chosen:
-        own = flown(scene, settings(rate), "gauss_seidel")
-        parallel = flown(scene, settings(rate), "jacobi")
+        own = lapwing_positions(scene, settings(rate), "gauss_seidel")
+        parallel = lapwing_positions(scene, settings(rate), "jacobi")
         setup = resolve(load(scene, settings(rate)))
         with tempfile.TemporaryDirectory() as name:
             paths = {part: Path(name) / f"{part}.fmu" for part in setup.order}

@@ -81,9 +81,9 @@ class LivePage:
         with self._server.atomic():
             for trail, step in zip(self._trails, steps, strict=True):
                 trail.extend(step)
-            self._tell(steps, events)
+            self._show_events(steps, events)
 
-    def _tell(self, steps: Sequence[FlightData], events: Sequence[list[Event]]) -> None:
+    def _show_events(self, steps: Sequence[FlightData], events: Sequence[list[Event]]) -> None:
         several = len(steps) > 1
         lines = [
             f"{event.time:8.2f}  {f'{step.vehicle}  ' if several else ''}{event.kind}  {event.text}"

@@ -52,7 +52,7 @@ def plot():
 
 
 def table():
-    return SimpleNamespace(title=HOSTILE, heads=[HOSTILE] * 2, rows=[[HOSTILE] * 2], failed=())
+    return SimpleNamespace(title=HOSTILE, caption=HOSTILE, heads=[HOSTILE] * 2, rows=[[HOSTILE] * 2], failed=())
 
 
 def pages():

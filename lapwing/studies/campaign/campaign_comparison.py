@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from lapwing.studies.campaign.campaign_plots import label_and_factor
 from lapwing.studies.campaign.folder import read
 from lapwing.studies.campaign.results import Results
 from lapwing.studies.campaign.statistics import Interval, interval, paired_difference
 from lapwing.studies.metrics import METRICS
+from lapwing.studies.terminal import table
 
 PLAN_ENTRIES = ("scene", "overrides", "vary", "sweep", "design", "versions")  # of a manifest; they define the flights
 
@@ -93,14 +93,11 @@ def show(console: Console, comparison: Comparison) -> None:
         console.print(f"  {name}: failures {p.value:.2%}, 95 % interval {p.low:.2%} to {p.high:.2%}")
     console.print(f"  failed in the first only: {comparison.only_first}, in the second only: {comparison.only_second}")
     title = "Means, and change from the first to the second with its 95 % interval"
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
-    table.add_column("metric", no_wrap=True)
-    for head in ("first", "second", "change", "from", "to"):
-        table.add_column(head, justify="right", no_wrap=True)
+    rows = table("metric", "first", "second", "change", "from", "to", title=title, box=None, pad_edge=False)
     for d in comparison.differences:
         label, scale = ("success [%]", 100.0) if d.figure == "success" else label_and_factor(d.figure)
         means = (f"{scale * mean:.4g}" for mean in (d.one, d.other))
         changes = (f"{scale * change:+.3g}" for change in d.difference)
-        table.add_row(f"{label}{' *' if d.is_significant else ''}", *means, *changes)
-    console.print(table)
+        rows.add_row(f"{label}{' *' if d.is_significant else ''}", *means, *changes)
+    console.print(rows)
     console.print("*: the interval excludes 0")
