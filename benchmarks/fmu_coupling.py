@@ -42,9 +42,8 @@ class Part:
         groups: dict[tuple[int, str], list[str]] = {}
         for name, v in self.variables.items():
             if v.causality == "input":
-                source = next(
-                    k for k, o in enumerate(others) if name in o.variables and o is not self and _is_output(o, name)
-                )
+                variables = [{} if other is self else other.variables for other in others]
+                source = next(k for k, o in enumerate(variables) if name in o and o[name].causality == "output")
                 groups.setdefault((source, v.type), []).append(name)
         for (k, kind), names in groups.items():
             read = [others[k].variables[name].valueReference for name in names]
@@ -66,10 +65,6 @@ class Part:
             references = [v.valueReference for v in own if v.type == kind]
             values |= zip(references, getattr(self.fmu, f"get{kind}")(references), strict=True)
         return [float(values[v.valueReference]) for v in own]
-
-
-def _is_output(part: Part, name: str) -> bool:
-    return part.variables[name].causality == "output"
 
 
 def coupled(setup: RunConfig, paths: dict[str, Path], jacobi: bool, ticks: int) -> np.ndarray:

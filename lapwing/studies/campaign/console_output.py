@@ -84,13 +84,12 @@ def _vehicles(console: Console, results: Results) -> None:
 
 def vehicle_cells(results: Results) -> dict[str, list[str]]:
     """Return the cells of `VEHICLE_COLUMNS` for each vehicle of a fleet."""
-    return {vehicle: _cells(results, vehicle) for vehicle in results.vehicles}
-
-
-def _cells(results: Results, vehicle: str) -> list[str]:
-    spreads = [results.spread(f"{vehicle}.{name}") for name in VEHICLE_FIGURES]
-    share = f"{results[f'{vehicle}.success'].astype(bool).mean():.1%}"
-    return [*(f"{s.worst:.4f}" if s else "" for s in spreads), share]
+    cells = {}
+    for vehicle in results.vehicles:
+        spreads = [results.spread(f"{vehicle}.{name}") for name in VEHICLE_FIGURES]
+        share = f"{results[f'{vehicle}.success'].astype(bool).mean():.1%}"
+        cells[vehicle] = [*(f"{s.worst:.4f}" if s else "" for s in spreads), share]
+    return cells
 
 
 def nearest_of(results: Results) -> str:

@@ -13,6 +13,7 @@ from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.accuracy.coordinates import matrices
 from lapwing.studies.flight_data import FlightData
+from lapwing.studies.rotation_arrays import from_xyzw
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 
 HARD = "a mission with a gyro bias jump, 60 s without GPS, an inverted magnetometer, or all sensors frozen"
@@ -82,7 +83,8 @@ def _outcome(flight: FlightData, min_eigenvalue: float) -> Outcome:
     estimate, truth = flight.estimate, flight.truth
     settled = estimate.times > 5.0  # after the filter has settled
     at = np.searchsorted(truth.times, estimate.times[settled]).clip(max=len(truth.times) - 1)
-    trace = np.einsum("ki,ki->k", *(_matrices(q) for q in (estimate.orientation[settled], truth.orientation[at])))
+    attitudes = estimate.orientation[settled], truth.orientation[at]
+    trace = np.einsum("ki,ki->k", *(matrices(from_xyzw(q)) for q in attitudes))
     return Outcome(
         estimate.times[settled],
         np.linalg.norm(estimate.position[settled] - truth.position[at], axis=1),
@@ -92,10 +94,6 @@ def _outcome(flight: FlightData, min_eigenvalue: float) -> Outcome:
         estimate.health_flags[settled] == 0,
         min_eigenvalue,
     )
-
-
-def _matrices(xyzw: np.ndarray) -> np.ndarray:
-    return matrices(np.roll(xyzw, 1, axis=1))
 
 
 def smallest_eigenvalue(covariance: np.ndarray) -> float:

@@ -43,9 +43,9 @@ def state_above_slope(
     return p, state
 
 
-def run_on(p: Any, state: Any, seconds: float, step: float = STEP) -> Any:
-    """Return the state after a time [s]."""
-    return multirotor.advance(METHOD, p, (0, 0), 0, state, MOTORS_OFF, step, round(seconds / step))
+def run_on(p: Any, state: Any, seconds: float, step: float = STEP, voltage: tuple[float, ...] = MOTORS_OFF) -> Any:
+    """Return the state after a time [s] under motor voltages [V]."""
+    return multirotor.advance(METHOD, p, (0, 0), 0, state, voltage, step, round(seconds / step))
 
 
 def restitution(speed: float, phase: float, step: float, tolerance: float = multirotor.CONTACT_TOLERANCE) -> float:
