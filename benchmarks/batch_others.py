@@ -31,7 +31,7 @@ VOLTS = 31.6
 
 
 class Lapwing:
-    """Return the functions of `lapwing.BatchSimulator` with the scene `hover`."""
+    """`lapwing.BatchSimulator` with the scene `hover`."""
 
     def __init__(self, n, step):
         self.batch = lapwing.BatchSimulator("hover", n, overrides=[f"solver.step={step}"])
@@ -47,7 +47,7 @@ class Lapwing:
 
 
 class MuJoCo:
-    """Return the functions of mujoco.rollout in one thread: a free body with four rotors of constant thrust."""
+    """mujoco.rollout in one thread: a free body with four rotors of constant thrust."""
 
     def __init__(self, n, step):
         import mujoco
@@ -79,7 +79,7 @@ class MuJoCo:
 
 
 class Crazyflow:
-    """Return the functions of Crazyflow's Crazyflie from first principles, compiled by JAX for the CPU."""
+    """Crazyflow's Crazyflie from first principles, compiled by JAX for the CPU."""
 
     def __init__(self, n, step):
         import jax.numpy as jnp

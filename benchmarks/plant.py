@@ -172,7 +172,7 @@ def main() -> None:
     print(f"{'RK4 step of the plant':55}   ns  ratio to {'C++' if other else 'bare'}")
     for name, value in rows:
         print(f"{name:55} {value:5.1f}  {value / reference:5.2f}")
-    print(f"inactive effects: {inactive:.3f} of the kernel that knows none")
+    print(f"inactive effects: {inactive:.3f} times the kernel without the catalogue")
 
 
 if __name__ == "__main__":

@@ -26,7 +26,7 @@ MAX_RUNS = 10_000_000  # limit of a campaign
 
 
 class Plan(NamedTuple):
-    """Plan of a campaign: scene, runs and what varies."""
+    """Plan of a campaign: scene, runs and varied keys."""
 
     path: str  # path or name of the scene
     overrides: tuple[str, ...]

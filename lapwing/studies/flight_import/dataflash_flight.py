@@ -88,7 +88,7 @@ def read_dataflash_flight(path: Path) -> Recording:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Discard what pymavlink prints for each damaged byte; its indexer in C does not use `sys.stderr`."""
+    """Discard the lines that pymavlink prints for each damaged byte; its indexer in C does not use `sys.stderr`."""
     kept = os.dup(2)
     try:
         with open(os.devnull, "wb") as null:

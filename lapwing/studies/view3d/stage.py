@@ -205,7 +205,7 @@ class Vehicle:
 
 
 def add_shaders(scene: Any) -> None:
-    """Add specks that are drawn as vehicles are: a browser compiles for seconds what it draws for the first time."""
+    """Add specks with the materials of vehicles: the first drawing of a material compiles its shaders for seconds."""
     speck = box((0.0, 0.0, 0.0), (1e-4,) * 3, BLADE)
     for k, looks in enumerate((speck, speck._replace(open=True), speck._replace(opacity=0.5))):
         add_solid(scene, f"/speck {k}", looks)
