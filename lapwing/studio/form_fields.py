@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 
 from lapwing.cosim.scene import Scene
 from lapwing.cosim.scene.load import SCENE_FILE
-from lapwing.file_schemas.annotations import Schema
+from lapwing.file_schemas.annotations import Schema, dereference
 from lapwing.studies.toml_text import toml
 
 FIRST = ("run", "vehicle", "trajectory", "effects", "sensors", "environment", "autopilot", "solver", "communication")
@@ -142,11 +142,7 @@ class _Reader:
 
     def _alternative(self, part: Schema, value: Any) -> Schema:
         """Return the schema's alternative that fits a value, with references resolved."""
-        if "$ref" in part:
-            target: Any = self._schema
-            for name in part["$ref"].removeprefix("#/").split("/"):
-                target = target[name]
-            part = {**target, **{k: v for k, v in part.items() if k != "$ref"}}
+        part = dereference(self._schema, part)
         if "anyOf" not in part:
             return part
         choices = [self._alternative(choice, value) for choice in part["anyOf"]]

@@ -78,8 +78,8 @@ def pages():
             vehicle_heads=[HOSTILE],
             vehicle_title=HOSTILE,
             nearest=HOSTILE,
-            refused=[(1, HOSTILE)],
-            refusals=1,
+            rejected=[(1, HOSTILE)],
+            rejections=1,
         ),
     )
 

@@ -216,7 +216,7 @@ def test_interval_is_computed_once_per_shard(monkeypatch):
     )
     rule, shards = StoppingRule(1e-9), {}
     for shard in range(300):
-        shards[shard ^ 1] = Count(10, 9, (("landed", 9), ("crashed", 1)))  # in pairs, in reverse order
+        shards[shard ^ 1] = Count(10, 9, {"landed": 9, "crashed": 1})  # in pairs, in reverse order
         assert not rule.reached(shards)
     assert requested == list(range(10, 3010, 10))
 
