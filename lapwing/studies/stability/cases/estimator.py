@@ -29,6 +29,7 @@ FAULTS: dict[str, dict[str, str]] = {
     "frozen": dict.fromkeys(SENSORS, f'{{kind = "freeze", {TO_THE_END}'),
 }
 SIGMAS = 6.0
+INVARIANT = "largest error over its standard deviation, while the health is good"
 WHY = "of 3000 estimates of nine states, one beyond six standard deviations is expected in ten thousand flights"
 
 
@@ -121,23 +122,21 @@ def run() -> CaseResult:
     for name, o in outcomes.items():
         before = np.flatnonzero(o.t < START)[-1]
         claimed_ratio = np.maximum(o.position / o.position_std[before], o.angle / o.angle_std[before])
-        baseline, label = "standard deviation before the fault", float(claimed_ratio[o.t >= START].max())
+        baseline = "standard deviation before the fault", float(claimed_ratio[o.t >= START].max())
         if name == "gyro_bias":
-            baseline, label = "integration of the gyro", 0.0175 * (o.t[-1] - START) / o.angle_std[before]
+            baseline = "integration of the gyro", 0.0175 * (o.t[-1] - START) / o.angle_std[before]
         if name == "magnetometer":
-            baseline, label = "heading of the magnetometer", np.pi / o.angle_std[before]
-        invariant = "largest error over its standard deviation, while the health is good"
+            baseline = "heading of the magnetometer", np.pi / o.angle_std[before]
         rows.append(
-            Row(name, "error-state filter with gates and health", invariant, SIGMAS, WHY,
-                float(o.ratio[o.healthy].max()), baseline, label)
+            Row(name, "error-state filter with gates and health", INVARIANT, SIGMAS, WHY,
+                float(o.ratio[o.healthy].max()), *baseline)
         )  # fmt: skip
         curves.append(Curve(name, o.t, np.maximum(o.ratio, 1e-3)))
     min_eigenvalue = min(o.min_eigenvalue for o in outcomes.values())
-    why = "a covariance has no negative eigenvalue"
-    method = "sequential updates of a symmetric covariance"
-    invariant = "negative part of the smallest eigenvalue of the correlations"
     rows.append(
-        Row("covariance", method, invariant, 0.0, why, max(0.0, -min_eigenvalue), "P = (1 - K H) P",
-            max(0.0, -textbook_eigenvalue()))
+        Row("covariance", "sequential updates of a symmetric covariance",
+            "negative part of the smallest eigenvalue of the correlations", 0.0,
+            "a covariance has no negative eigenvalue", max(0.0, -min_eigenvalue),
+            "P = (1 - K H) P", max(0.0, -textbook_eigenvalue()))
     )  # fmt: skip
     return CaseResult(rows, Plot("time [s]", "error over its standard deviation", curves, SIGMAS))
