@@ -17,13 +17,7 @@ from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.multibody import augmented, five_bodies
 from lapwing.dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone, motion
 from lapwing.dynamics.multibody.delivery_drone import rate as delivery_drone_rate
-from lapwing.dynamics.multibody.five_body_stabilisation import (
-    NONE,
-    PARTITION,
-    PROJECTION,
-    advance,
-    assembled_state,
-)
+from lapwing.dynamics.multibody.five_body_stabilisation import NONE, PARTITION, PROJECTION, advance, assembled_state
 from lapwing.dynamics.multibody.mechanisms import drone_system
 from lapwing.kernels import kernel
 from lapwing.kernels.state_tree import axpy, embed

@@ -122,8 +122,7 @@ def bare():
     p = multirotor.parameters(DRONE, effects.from_scene(BARE, DRONE))
     state = multirotor.initial_state(p, (0.0, 0.0, 10.0), rotor_speed=330.0)
     times = nanoseconds_per_step(
-        lambda: exchanges(RK4, p, KEY, state, HOVER, H, STEPS, 1),
-        lambda: bare_steps(p, state.motion, HOVER, H, STEPS),
+        lambda: exchanges(RK4, p, KEY, state, HOVER, H, STEPS, 1), lambda: bare_steps(p, state.motion, HOVER, H, STEPS)
     )
     reached = exchanges(RK4, p, KEY, state, HOVER, H, STEPS, 1).motion.position_world
     return *times.min(axis=0), np.median(times[:, 0] / times[:, 1]), reached

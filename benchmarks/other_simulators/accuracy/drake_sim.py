@@ -7,13 +7,7 @@ import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import (
-    BallRpyJoint,
-    QuaternionFloatingJoint,
-    RevoluteJoint,
-    SpatialInertia,
-    UnitInertia,
-)
+from pydrake.multibody.tree import BallRpyJoint, QuaternionFloatingJoint, RevoluteJoint, SpatialInertia, UnitInertia
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from benchmarks.other_simulators.accuracy import matrix, outcome

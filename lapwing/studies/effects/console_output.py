@@ -26,7 +26,7 @@ def show(console: Console, study: Study) -> None:
     console.print(
         f"Smallest set within {study.within:g} m: {', '.join(study.smallest) or 'none'} "
         f"(distance {study.distance:.2g} m; "
-        f"saves {saved[0]:.0%} of a step hovering, {saved[1]:.0%} on the ground)",
+        f"saves {saved[0]:.0%} of a step hovering, {saved[1]:.0%} on the ground)"
     )
     console.print('Costs after "<" are below the resolution of the measurement.')
     names = ", ".join(row.name for row in study.missing)

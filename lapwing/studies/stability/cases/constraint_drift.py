@@ -11,14 +11,7 @@ from lapwing.kernels.state_tree import flatten
 from lapwing.studies.accuracy.systems.delivery_drone import AIRFRAME, SPEED, ZERO, flight
 from lapwing.studies.accuracy.systems.delivery_drone import initial_bodies as drone_bodies
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
-from lapwing.studies.stability.drone import (
-    METHOD,
-    PAPER,
-    STABILISATIONS,
-    delivery_drone,
-    hinge_defects,
-    spinning_state,
-)
+from lapwing.studies.stability.drone import METHOD, PAPER, STABILISATIONS, delivery_drone, hinge_defects, spinning_state
 
 HARD = "an hour of five bodies with 20 constraints: the index-1 equations enforce only their second derivative"
 
