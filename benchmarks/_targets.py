@@ -1,14 +1,9 @@
 """Measured figures and their targets."""
 
-import os
-import shutil
 import subprocess
 import sys
-import tempfile
 import time
-from collections.abc import Iterable, Iterator
-from contextlib import contextmanager
-from pathlib import Path
+from collections.abc import Iterable
 from statistics import median
 from typing import NamedTuple
 
@@ -48,16 +43,6 @@ def percentile(values: Iterable[float], share: float) -> float:
     return ordered[int(share * (len(ordered) - 1))]
 
 
-@contextmanager
-def empty_cache() -> Iterator[dict[str, str]]:
-    """Yield an environment with a separate kernel cache that is empty at the start."""
-    folder = tempfile.mkdtemp()
-    try:
-        yield {**os.environ, "LAPWING_CACHE": folder}
-    finally:
-        shutil.rmtree(folder, ignore_errors=True)
-
-
 def wall(command: list[str], repeats: int = 1, **options) -> float:
     """Return the median wall time [s] of a command; of several runs, a first one is not counted."""
     times = []
@@ -66,8 +51,3 @@ def wall(command: list[str], repeats: int = 1, **options) -> float:
         subprocess.run(command, check=True, stdout=subprocess.DEVNULL, **options)
         times.append(time.perf_counter() - began)
     return median(times[1:] or times)
-
-
-def size_mb(path: Path) -> float:
-    """Return the size of a file [MB]."""
-    return path.stat().st_size / 1e6

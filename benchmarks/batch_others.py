@@ -31,7 +31,7 @@ VOLTS = 31.6
 
 
 class Lapwing:
-    """Return the functions of `lapwing.BatchSimulator` with the scene `hover`."""
+    """`lapwing.BatchSimulator` with the scene `hover`."""
 
     def __init__(self, n, step):
         self.batch = lapwing.BatchSimulator("hover", n, overrides=[f"solver.step={step}"])
@@ -47,7 +47,7 @@ class Lapwing:
 
 
 class MuJoCo:
-    """Return the functions of mujoco.rollout in one thread: a free body with four rotors of constant thrust."""
+    """mujoco.rollout in one thread: a free body with four rotors of constant thrust."""
 
     def __init__(self, n, step):
         import mujoco
@@ -79,7 +79,7 @@ class MuJoCo:
 
 
 class Crazyflow:
-    """Return the functions of Crazyflow's Crazyflie from first principles, compiled by JAX for the CPU."""
+    """Crazyflow's Crazyflie from first principles, compiled by JAX for the CPU."""
 
     def __init__(self, n, step):
         import jax.numpy as jnp
@@ -112,21 +112,21 @@ CONTESTANTS = {"lapwing": Lapwing, "mujoco": MuJoCo, "crazyflow": Crazyflow}  # 
 
 
 def main():
-    there = [name for name in CONTESTANTS if find_spec(name)]
-    for name in CONTESTANTS.keys() - set(there):
+    installed = [name for name in CONTESTANTS if find_spec(name)]
+    for name in CONTESTANTS.keys() - set(installed):
         print(f"{name} is not installed: pip install 'lapwing[bench]'")
-    measured = {name: [alone(name) for _ in range(ROUNDS)] for name in there}
+    measured = {name: [measure_in_process(name) for _ in range(ROUNDS)] for name in installed}
     rates = {name: median(rate for rate, _ in result) for name, result in measured.items()}
     print(f"{'':12}{'10^6 steps/s a core':>20}{'attitude error':>16}")
-    for name in there:
+    for name in installed:
         print(f"{name:12}{1e-6 * rates[name]:20.2f}{measured[name][0][1]:16.1e}")
     result = [
-        Row(f"batch to {name}, steps a core", rates["lapwing"] / rates[name], "", 3.0, True) for name in there[1:]
+        Row(f"batch to {name}, steps a core", rates["lapwing"] / rates[name], "", 3.0, True) for name in installed[1:]
     ]
     return show(result)
 
 
-def alone(name):
+def measure_in_process(name):
     """Return (steps per second of processor time, error) of a simulator in a separate process."""
     environment = {**os.environ, "SCIPY_ARRAY_API": "1"}  # Crazyflow needs it before SciPy is imported
     command = [sys.executable, "-W", "ignore", "-m", "benchmarks.batch_others", name]

@@ -28,23 +28,23 @@ PARTS = {
     "graph": (lapwing.studies.simulate, "BlockDiagram"),
     FLIGHT: (BlockDiagram, "advance"),
     "rows as columns": (FlightData, "of_each"),
-    "figures": (campaign_runs, "figures"),
+    "metrics": (campaign_runs, "metrics"),
 }
 """Parts of a run: name and functions."""
 
 
 def main(runs=20):
-    seconds, besides, simulated = flown(plan(SCENE, runs=runs))
-    _, besides_varied, _ = flown(plan(SCENE, runs=runs, vary=VARIED))
+    seconds, overhead, simulated = measure(plan(SCENE, runs=runs))
+    _, varied_overhead, _ = measure(plan(SCENE, runs=runs, vary=VARIED))
     result = [
         Row("closed-loop campaign, one core, to real time", simulated / seconds, "", 1500.0, True),
-        Row("campaign: a run besides its flight, seed only", 100.0 * besides, "%", 5.0),
-        Row("campaign: a run besides its flight, mass and wind drawn", 100.0 * besides_varied, "%", 5.0),
+        Row("campaign: overhead of a run, seed only", 100.0 * overhead, "%", 5.0),
+        Row("campaign: overhead of a run, mass and wind drawn", 100.0 * varied_overhead, "%", 5.0),
     ]
     return show(result)
 
 
-def flown(options):
+def measure(options):
     """Return processor time [s], ratio of other work to the flight, and simulated time [s] of the runs of a plan."""
     rows, total, simulated = {}, [], 0.0
     row_of(options, 0, rows)  # loads compiled kernels
@@ -55,8 +55,8 @@ def flown(options):
             simulated += row_of(options, run, rows)["duration"]
             total.append(time.process_time() - began)
     print(", ".join(f"{part} {1e3 * median(times):.2f} ms" for part, times in spent.items()), flush=True)
-    besides = median((whole - flight) / flight for whole, flight in zip(total, spent[FLIGHT], strict=True))
-    return sum(total), besides, simulated
+    overhead = median((whole - flight) / flight for whole, flight in zip(total, spent[FLIGHT], strict=True))
+    return sum(total), overhead, simulated
 
 
 @contextmanager

@@ -19,21 +19,21 @@ CAMPAIGN = [*LAPWING, "campaign", "hover", "--set", "run.duration=2", "--workers
 def main(most=10000):
     counts, cost = [10**k for k in range(2, 9) if 10**k <= most], {}
     with tempfile.TemporaryDirectory() as folder:
-        taken([*CAMPAIGN, "--runs", "1", "--out", f"{folder}/warm"])
+        measure_command([*CAMPAIGN, "--runs", "1", "--out", f"{folder}/warm"])
         for runs in counts:
-            cost[runs] = taken([*CAMPAIGN, "--runs", str(runs), "--out", f"{folder}/{runs}"])
+            cost[runs] = measure_command([*CAMPAIGN, "--runs", str(runs), "--out", f"{folder}/{runs}"])
             print(f"{runs:9} runs: {cost[runs][0]:8.1f} s, {cost[runs][1]:5.0f} MB", flush=True)
     each = [(cost[b][0] - cost[a][0]) / (b - a) for a, b in pairwise(counts)]  # [s] for every further run
     for runs, further in zip(counts[1:], each, strict=True):
-        print(f"up to {runs:9} runs: {1e3 * further:.2f} ms for every further one")
+        print(f"up to {runs:9} runs: {1e3 * further:.2f} ms for each further run")
     result = [
-        Row(f"campaign: a further run up to {most} runs to one up to 1000", each[-1] / each[0], "", 1.1),
+        Row(f"campaign: cost of a further run, up to {most} to up to 1000 runs", each[-1] / each[0], "", 1.1),
         Row(f"campaign: peak memory, {most} runs to 1000", cost[most][1] / cost[1000][1], "", 1.1),
     ]
     return show(result)
 
 
-def taken(command):
+def measure_command(command):
     """Return processor time [s] and peak memory [MB] of a command."""
     process = subprocess.Popen(command, stdout=subprocess.DEVNULL)
     _, status, usage = os.wait4(process.pid, 0)

@@ -37,17 +37,17 @@ OVERRIDES = (f"run.duration={SECONDS}",)
 GIVEN, ROWS = plan("hover", OVERRIDES, runs=1000), {}
 
 
-def ours():
+def lapwing_flights():
     for run in range(RUNS):
         row_of(GIVEN, run, ROWS)
 
 
-def our_error():
+def lapwing_error():
     steps = STEP, STEP / 8
     ends = [
         fly(campaign_setup(load("hover", [*OVERRIDES, f"solver.step={h}"])), TOPICS).truth.position[-1] for h in steps
     ]
-    return apart(*ends)
+    return largest_difference(*ends)
 
 
 def rotorpy(**integrator):
@@ -74,9 +74,11 @@ class Simulator(NamedTuple):
 
 def simulators():
     """Return the installed simulators by name."""
-    result = {"lapwing": Simulator(ours, RUNS, our_error)}
+    result = {"lapwing": Simulator(lapwing_flights, RUNS, lapwing_error)}
     if find_spec("rotorpy"):
-        result["RotorPy"] = Simulator(rotorpy, 1, lambda: apart(rotorpy(), rotorpy(rtol=1e-10, atol=1e-12)))
+        result["RotorPy"] = Simulator(
+            rotorpy, 1, lambda: largest_difference(rotorpy(), rotorpy(rtol=1e-10, atol=1e-12))
+        )
     if find_spec("jsbsim"):
         for step in (STEP, CONTROL):
             result[f"JSBSim, steps of {1e3 * step:g} ms"] = in_jsbsim(step)
@@ -94,10 +96,10 @@ def in_jsbsim(step):
     def last(of):
         return of.fly(SECONDS, (AWAY, 0.0, 0.0))
 
-    return Simulator(fly, RUNS, lambda: apart(last(vehicle), last(JsbsimQuad(step / 8))))
+    return Simulator(fly, RUNS, lambda: largest_difference(last(vehicle), last(JsbsimQuad(step / 8))))
 
 
-def apart(one, other):
+def largest_difference(one, other):
     """Return the largest difference of two positions [m] along any axis."""
     return np.abs(one - other).max()
 

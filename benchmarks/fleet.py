@@ -12,7 +12,7 @@ import time
 from pathlib import Path
 
 from benchmarks._targets import LAPWING, Row, show
-from benchmarks.campaign_scaling import taken
+from benchmarks.campaign_scaling import measure_command
 from lapwing.runs.single_process_run import fly_single
 from lapwing.services.scene_resolver import load, resolve
 
@@ -54,13 +54,14 @@ def main(most=32):
         single, apart = {}, {}
         for n in counts:
             single[n], apart[n] = (
-                per_second(lambda duration, fly=fly, n=n: fly(scenes[n], log, duration)) for fly in (alone, processes)
+                per_second(lambda duration, fly=fly, n=n: fly(scenes[n], log, duration))
+                for fly in (single_process, multi_process)
             )
-            print(f"{n:3} vehicles: {1e3 * single[n]:7.1f} ms/s in one process, {1e3 * apart[n]:7.1f} in processes;"
+            print(f"{n:3} vehicles: {1e3 * single[n]:7.1f} ms/s in one process, {1e3 * apart[n]:7.1f} in multi_process;"
                   f" of each {1e3 * single[n] / n:6.1f} and {1e3 * apart[n] / n:6.1f}", flush=True)  # fmt: skip
     result = [
-        Row(f"fleet of {most}, one process: a vehicle to one alone", single[most] / most / single[1], "", 1.1),
-        Row(f"fleet of {most}, processes: a vehicle to one alone", apart[most] / most / apart[1], "", 1.1),
+        Row(f"fleet of {most}, one process: a vehicle to one single_process", single[most] / most / single[1], "", 1.1),
+        Row(f"fleet of {most}, multi_process: a vehicle to one single_process", apart[most] / most / apart[1], "", 1.1),
     ]
     return show(result)
 
@@ -68,18 +69,19 @@ def main(most=32):
 def scene(n, path):
     """Write a scene of n vehicles. Return its path."""
     entries = [
-        f'[[vehicle]]\nairframe = "quad_x"\nstart = [{APART * (i // ROW)}, {APART * (i % ROW)}]\n' for i in range(n)
+        f'[[vehicle]]\nairframe = "quad_x"\ninitial_position = [{APART * (i // ROW)}, {APART * (i % ROW)}]\n'
+        for i in range(n)
     ]
     path.write_text(COMMON + "".join(entries))
     return path
 
 
 def per_second(flight):
-    """Return processor time per simulated second; `fly` flies for a duration [s] and returns its processor time [s]."""
+    """Return processor time per simulated second; `flight` returns the processor time [s] of a duration [s]."""
     return (flight(LONG) - flight(BRIEF)) / (LONG - BRIEF)
 
 
-def alone(path, log, duration):
+def single_process(path, log, duration):
     """Return the processor time [s] of a flight in this process."""
     setup = resolve(load(path, [f"run.duration={duration}"]))
     began = time.process_time()
@@ -87,10 +89,10 @@ def alone(path, log, duration):
     return time.process_time() - began
 
 
-def processes(path, log, duration):
-    """Return the processor time [s] of a command and all its processes."""
+def multi_process(path, log, duration):
+    """Return the processor time [s] of a command and all its multi_process."""
     fly = [*LAPWING, "run", str(path), "--log", str(log), "--key-prefix", "benchmark-fleet"]
-    return taken([*fly, "--set", f"run.duration={duration}"])[0]
+    return measure_command([*fly, "--set", f"run.duration={duration}"])[0]
 
 
 if __name__ == "__main__":

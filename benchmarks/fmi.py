@@ -95,14 +95,8 @@ def main(scene: str, rate: str = "1000") -> None:
         make.restype = ctypes.c_void_p
         end.argtypes = [ctypes.c_void_p]
         enter = library.fmi3EnterInitializationMode
-        enter.argtypes = [
-            ctypes.c_void_p,
-            ctypes.c_bool,
-            ctypes.c_double,
-            ctypes.c_double,
-            ctypes.c_bool,
-            ctypes.c_double,
-        ]
+        flag, number = ctypes.c_bool, ctypes.c_double
+        enter.argtypes = [ctypes.c_void_p, flag, number, number, flag, number]
         library.fmi3ExitInitializationMode.argtypes = [ctypes.c_void_p]
         place = {v.name: v.valueReference for v in model.modelVariables}[HEIGHT_VARIABLE]
         one = ctypes.c_size_t(1)

@@ -42,9 +42,8 @@ class Part:
         groups: dict[tuple[int, str], list[str]] = {}
         for name, v in self.variables.items():
             if v.causality == "input":
-                source = next(
-                    k for k, o in enumerate(others) if name in o.variables and o is not self and _is_output(o, name)
-                )
+                variables = [{} if other is self else other.variables for other in others]
+                source = next(k for k, o in enumerate(variables) if name in o and o[name].causality == "output")
                 groups.setdefault((source, v.type), []).append(name)
         for (k, kind), names in groups.items():
             read = [others[k].variables[name].valueReference for name in names]
@@ -66,10 +65,6 @@ class Part:
             references = [v.valueReference for v in own if v.type == kind]
             values |= zip(references, getattr(self.fmu, f"get{kind}")(references), strict=True)
         return [float(values[v.valueReference]) for v in own]
-
-
-def _is_output(part: Part, name: str) -> bool:
-    return part.variables[name].causality == "output"
 
 
 def coupled(setup: RunConfig, paths: dict[str, Path], jacobi: bool, ticks: int) -> np.ndarray:
@@ -100,7 +95,7 @@ def coupled(setup: RunConfig, paths: dict[str, Path], jacobi: bool, ticks: int) 
     return np.array(rows)
 
 
-def flown(scene: str, settings: list[str], coupling: str) -> np.ndarray:
+def lapwing_positions(scene: str, settings: list[str], coupling: str) -> np.ndarray:
     return np.array(fly(load(scene, [*settings, f"communication.coupling={coupling}"]), (TRUTH,)).truth.position)
 
 
@@ -120,12 +115,12 @@ def main(scene: str, *rates: str) -> None:
         step = 1.0 / (FINEST * max(chosen))  # equal for all rates
         return [*noise_overrides(loaded), *rate_overrides(loaded, rate), f"solver.step={step!r}"]
 
-    finest = flown(scene, settings(FINEST * max(chosen)), "gauss_seidel")
+    finest = lapwing_positions(scene, settings(FINEST * max(chosen)), "gauss_seidel")
     print("| rate | FMPy Gauss-Seidel to `lapwing run` | FMPy Jacobi to `lapwing run` with Jacobi |", end="")
     print(" Gauss-Seidel to finest | Jacobi to Gauss-Seidel |\n|---|---|---|---|---|")
     for rate in chosen:
-        own = flown(scene, settings(rate), "gauss_seidel")
-        parallel = flown(scene, settings(rate), "jacobi")
+        own = lapwing_positions(scene, settings(rate), "gauss_seidel")
+        parallel = lapwing_positions(scene, settings(rate), "jacobi")
         setup = resolve(load(scene, settings(rate)))
         with tempfile.TemporaryDirectory() as name:
             paths = {part: Path(name) / f"{part}.fmu" for part in setup.order}

@@ -40,7 +40,7 @@ def show(landings: Collection[LandingErrors]) -> None:
     table = ratios(landings)
     events = sum(landing.events for landing in landings)
     print(f"{len(landings)} landings, {events} located events; error over accuracy, entire state, every 4 ms")
-    print(f"{'asked':>8} {'median':>9} {'nine in ten':>12} {'largest':>9} {'above 1':>8} {'ms each':>9}")
+    print(f"{'required':>8} {'median':>9} {'nine in ten':>12} {'largest':>9} {'above 1':>8} {'ms each':>9}")
     seconds = np.array([landing.seconds for landing in landings])
     for k, accuracy in enumerate(ACCURACIES):
         column = table[:, k]

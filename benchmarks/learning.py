@@ -2,9 +2,9 @@
 
     python -m benchmarks.learning [STEPS]
 
-STEPS is the number of environment steps of all vehicles together, equal for both; each simulator has a process of its
-own. gym-pybullet-drones has one vehicle per environment: Gymnasium's SyncVectorEnv steps them one after another. It is
-skipped if it is not installed (`pip install git+https://github.com/utiasDSL/gym-pybullet-drones`).
+STEPS is the number of environment steps of all vehicles together, equal for both; each simulator runs in a separate
+process. gym-pybullet-drones has one vehicle per environment: Gymnasium's SyncVectorEnv steps them one after another. It
+is skipped if it is not installed (`pip install git+https://github.com/utiasDSL/gym-pybullet-drones`).
 """
 
 import multiprocessing

@@ -42,12 +42,8 @@ SAMPLES = {
     ODOM: Odometry(header(0, "world")),
     POSE: PoseStamped(header(0, "world")),
 }
-ROWS = (  # messages per second, speed of the disk [bytes/s]; 0: unlimited
-    (5_000, 0),
-    (20_000, 0),
-    (50_000, 0),
-    (50_000, 4_000_000),
-)
+# messages per second, speed of the disk [bytes/s]; 0: unlimited
+ROWS = ((5_000, 0), (20_000, 0), (50_000, 0), (50_000, 4_000_000))
 
 
 def setup(rate, seconds):
@@ -78,10 +74,8 @@ def publish(options, endpoints, seconds):
     listen, connect = mesh(SOURCE, endpoints)
     with ZenohBus(listen, connect, gid=PARTICIPANTS.gid(SOURCE)) as bus:
         process = Participant(SOURCE, options, bus, PARTICIPANTS, [SOURCE, RECORDER])
-        backlog, put = (
-            LogBackpressure(process, RECORDER),
-            bus.publisher(f"{PARTICIPANTS.key_prefix}/{BATCH_KEY}/{SOURCE}"),
-        )
+        backlog = LogBackpressure(process, RECORDER)
+        put = bus.publisher(f"{PARTICIPANTS.key_prefix}/{BATCH_KEY}/{SOURCE}")
         process.join()
         step = -(-options.rate // 10)
         started, first, end = time.perf_counter(), 0, int(options.rate * seconds)

@@ -10,7 +10,7 @@ import sys
 import tempfile
 
 from benchmarks._targets import LAPWING
-from benchmarks.campaign_scaling import taken
+from benchmarks.campaign_scaling import measure_command
 
 SLOW = True
 HOVERS = ["--set", "trajectory.phase.2.duration=1e6"]
@@ -21,7 +21,7 @@ def main(most=600):
         seconds = 75
         while seconds <= most:
             words = ["run", "delivery_mission", "--mode", "single-process", *HOVERS, "--set", f"run.duration={seconds}"]
-            processor, peak = taken([*LAPWING, *words, "--log", f"{folder}/{seconds}.mcap"])
+            processor, peak = measure_command([*LAPWING, *words, "--log", f"{folder}/{seconds}.mcap"])
             print(
                 f"{seconds:7} s simulated: {processor:6.1f} s of processor time, {peak:6.0f} MB at the most", flush=True
             )

@@ -101,14 +101,8 @@ def soak(folder):
     """Fly up and down for 30 simulated minutes. Return (simulated [s], wall [s], longest gap [s], flights)."""
     port = free_port()
     station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
-    more = [
-        "--speed",
-        f"{SOAK_SPEED:g}",
-        "--set",
-        "autopilot.follow_trajectory=false",
-        "--set",
-        f"run.duration={SOAK:g}",
-    ]
+    more = ["--speed", f"{SOAK_SPEED:g}"]
+    more += ["--set", "autopilot.follow_trajectory=false", "--set", f"run.duration={SOAK:g}"]
     gaps, last, flights, airborne, sent, now, requested = [0.0], None, 0, False, 0.0, 0.0, -1e9
     with start("lapwing/scenes/hover.toml", folder, "--mavlink", f"udpout:127.0.0.1:{port}", *more) as run:
         began = None

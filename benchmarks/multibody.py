@@ -14,9 +14,10 @@ import numpy as np
 
 from lapwing.dynamics.integrators import get, integrate_fixed
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
-from lapwing.dynamics.multibody import augmented, five_bodies, five_body_stabilisation
+from lapwing.dynamics.multibody import augmented, five_bodies
 from lapwing.dynamics.multibody.delivery_drone import DroneState, Flight, Loads, delivery_drone, motion
 from lapwing.dynamics.multibody.delivery_drone import rate as delivery_drone_rate
+from lapwing.dynamics.multibody.five_body_stabilisation import NONE, PARTITION, PROJECTION, advance, assembled_state
 from lapwing.dynamics.multibody.mechanisms import drone_system
 from lapwing.kernels import kernel
 from lapwing.kernels.state_tree import axpy, embed
@@ -83,7 +84,7 @@ def times(repeats=200):
     """Return seconds per call of each function, the best of interleaved repeats that are shorter than a time slice."""
     drone = delivery_drone(**PAPER, propeller_inertia=INERTIA)
     p = five_bodies.machine(drone, GRAVITY)
-    x = five_body_stabilisation.assembled_state(p, five_bodies.BodyState(*START[:4]), ANGLES, SPEEDS)
+    x = assembled_state(p, five_bodies.BodyState(*START[:4]), ANGLES, SPEEDS)
     system, (q, v) = drone_system(drone), five_bodies.arrays(x)
     wrench, drive = np.zeros((5, 6)), np.array([[s, 0.0] for s in SPEEDS])
     flight, h = Flight(drone, QUIET), 1e-4
@@ -91,22 +92,10 @@ def times(repeats=200):
         "general acceleration solve": (lambda n: general_solves(system.arrays, q, v.copy(), wrench, drive, n), 40),
         "fast path, five bodies": (lambda n: five_body_solves(p, x, n), 3000),
         "fast path, least coordinates": (lambda n: least_solves(flight, START, n), 3000),
-        "five-body RK4 step": (
-            lambda n: five_body_stabilisation.advance(METHOD, p, 0.0, x, h, n, five_body_stabilisation.NONE),
-            300,
-        ),
-        "five-body RK4 step, partitioning": (
-            lambda n: five_body_stabilisation.advance(METHOD, p, 0.0, x, h, n, five_body_stabilisation.PARTITION),
-            200,
-        ),
-        "five-body RK4 step, projection": (
-            lambda n: five_body_stabilisation.advance(METHOD, p, 0.0, x, h, n, five_body_stabilisation.PROJECTION),
-            200,
-        ),
-        "five-body RKMK4 step, projection": (
-            lambda n: five_body_stabilisation.advance(LIE, p, 0.0, x, h, n, five_body_stabilisation.PROJECTION),
-            200,
-        ),
+        "five-body RK4 step": (lambda n: advance(METHOD, p, 0.0, x, h, n, NONE), 300),
+        "five-body RK4 step, partitioning": (lambda n: advance(METHOD, p, 0.0, x, h, n, PARTITION), 200),
+        "five-body RK4 step, projection": (lambda n: advance(METHOD, p, 0.0, x, h, n, PROJECTION), 200),
+        "five-body RKMK4 step, projection": (lambda n: advance(LIE, p, 0.0, x, h, n, PROJECTION), 200),
         "least-coordinate RK4 step": (lambda n: integrate_fixed(METHOD, flight, 0.0, START, h, n), 1000),
     }
     try:
@@ -134,20 +123,15 @@ def times(repeats=200):
 def errors(h=1e-3, seconds=2.0):
     """Return the largest attitude error [-] against a step of h / 16: Lapwing (two methods) and MuJoCo."""
     drone = delivery_drone(**PAPER, propeller_inertia=INERTIA)
-    n, flight = round(seconds / h), Flight(delivery_drone(**PAPER, propeller_inertia=INERTIA), QUIET)
+    n, flight = round(seconds / h), Flight(drone, QUIET)
     true = np.array(integrate_fixed(METHOD, flight, 0.0, START, h / 16, 16 * n).attitude)
     out = {"least coordinates": np.array(integrate_fixed(METHOD, flight, 0.0, START, h, n).attitude)}
     p = five_bodies.machine(drone, GRAVITY)
-    x = five_body_stabilisation.assembled_state(p, five_bodies.BodyState(*START[:4]), ANGLES, SPEEDS)
-    out["five bodies, projection"] = np.array(
-        five_body_stabilisation.advance(METHOD, p, 0.0, x, h, n, five_body_stabilisation.PROJECTION).chassis.attitude
-    )
-    out["five bodies, partitioning"] = np.array(
-        five_body_stabilisation.advance(METHOD, p, 0.0, x, h, n, five_body_stabilisation.PARTITION).chassis.attitude
-    )
-    out["five bodies, projection, RKMK4"] = np.array(
-        five_body_stabilisation.advance(LIE, p, 0.0, x, h, n, five_body_stabilisation.PROJECTION).chassis.attitude
-    )
+    x = assembled_state(p, five_bodies.BodyState(*START[:4]), ANGLES, SPEEDS)
+    variants = {"projection": (METHOD, PROJECTION), "partitioning": (METHOD, PARTITION), "RKMK4": (LIE, PROJECTION)}
+    for name, (method, stabilisation) in variants.items():
+        end = advance(method, p, 0.0, x, h, n, stabilisation)
+        out[f"five bodies, {name}"] = np.array(end.chassis.attitude)
     try:
         import mujoco
 

@@ -64,7 +64,7 @@ def exchanges(method, p, key, state, command, h, n, ticks):
     return state
 
 
-def taken(*runs):
+def nanoseconds_per_step(*runs):
     """Return ns per step, a row for each repetition; the runs alternate, so that other work affects all of them."""
     for run in runs:
         run()
@@ -81,7 +81,7 @@ def measure(tables, height, command, n):
     """Return ns per step with n steps in a communication step."""
     p = multirotor.parameters(DRONE, effects.from_scene(tables, DRONE))
     state = multirotor.initial_state(p, (0.0, 0.0, height), rotor_speed=330.0 if height > 1.0 else 0.0)
-    return taken(lambda: exchanges(RK4, p, KEY, state, command, H, n, STEPS // n)).min()
+    return nanoseconds_per_step(lambda: exchanges(RK4, p, KEY, state, command, H, n, STEPS // n)).min()
 
 
 @always_inline
@@ -121,9 +121,8 @@ def bare():
     """Return ns per step with and without the catalogue, the ratio, and the final position."""
     p = multirotor.parameters(DRONE, effects.from_scene(BARE, DRONE))
     state = multirotor.initial_state(p, (0.0, 0.0, 10.0), rotor_speed=330.0)
-    times = taken(
-        lambda: exchanges(RK4, p, KEY, state, HOVER, H, STEPS, 1),
-        lambda: bare_steps(p, state.motion, HOVER, H, STEPS),
+    times = nanoseconds_per_step(
+        lambda: exchanges(RK4, p, KEY, state, HOVER, H, STEPS, 1), lambda: bare_steps(p, state.motion, HOVER, H, STEPS)
     )
     reached = exchanges(RK4, p, KEY, state, HOVER, H, STEPS, 1).motion.position_world
     return *times.min(axis=0), np.median(times[:, 0] / times[:, 1]), reached
@@ -172,7 +171,7 @@ def main() -> None:
     print(f"{'RK4 step of the plant':55}   ns  ratio to {'C++' if other else 'bare'}")
     for name, value in rows:
         print(f"{name:55} {value:5.1f}  {value / reference:5.2f}")
-    print(f"inactive effects: {inactive:.3f} of the kernel that knows none")
+    print(f"inactive effects: {inactive:.3f} times the kernel without the catalogue")
 
 
 if __name__ == "__main__":

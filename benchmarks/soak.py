@@ -97,24 +97,24 @@ def rows(samples: list[Sample], name: str) -> list[Row]:
     quarter = len(samples) // 4
     first, early, late = samples[: quarter + 1], samples[quarter : 2 * quarter + 1], samples[-quarter - 1 :]
 
-    def rate(some: list[Sample], what: str, per: str) -> float:
+    def rate(some: list[Sample], field: str, reference: str) -> float:
         begin, end = some[0]._asdict(), some[-1]._asdict()
-        return (end[what] - begin[what]) / (end[per] - begin[per])
+        return (end[field] - begin[field]) / (end[reference] - begin[reference])
 
-    def grown(what: str) -> float:
-        return mean(getattr(s, what) for s in late) / mean(getattr(s, what) for s in early)
+    def growth(field: str) -> float:
+        return mean(getattr(s, field) for s in late) / mean(getattr(s, field) for s in early)
 
-    def ratio(what: str, per: str, former: list[Sample]) -> float:
-        return rate(late, what, per) / rate(former, what, per)
+    def ratio(field: str, reference: str, former: list[Sample]) -> float:
+        return rate(late, field, reference) / rate(former, field, reference)
 
     speed, last = rate(samples, "simulated", "wall"), samples[-1]
     cost, size = rate(samples, "processor", "simulated"), rate(samples, "log", "simulated")
     print(f"{name}: {last.simulated:.0f} s in {last.wall:.0f} s, {speed:.1f} times real time; a simulated second takes")
     print(f"{1e3 * cost:.1f} ms of processor time and {1e3 * size:.0f} kB of log; last quarter over second:")
     return [
-        Row(f"{name}: memory", grown("memory"), "", 1.02),
-        Row(f"{name}: open files", grown("files"), "", 1.0),
-        Row(f"{name}: threads", grown("threads"), "", 1.0),
+        Row(f"{name}: memory", growth("memory"), "", 1.02),
+        Row(f"{name}: open files", growth("files"), "", 1.0),
+        Row(f"{name}: threads", growth("threads"), "", 1.0),
         Row(f"{name}: processor time", ratio("processor", "simulated", early), "", 1.1),
         Row(f"{name}: log", ratio("log", "simulated", early), "", 1.02),
         Row(f"{name}: processor time, to the first", ratio("processor", "simulated", first), "", 1.1),

@@ -87,11 +87,7 @@ def _pod(name: str, scene: str, table: str, image: str) -> dict[str, Any]:
     }.get(name, ["lapwing", "service", name, scene])
     writes = name in (MONITOR, process_table.RECORDER)
     keys = {"name": "keys", "mountPath": f"/app/keys/{name}"}
-    restricted = {
-        "allowPrivilegeEscalation": False,
-        "readOnlyRootFilesystem": True,
-        "capabilities": {"drop": ["ALL"]},
-    }
+    restricted = {"allowPrivilegeEscalation": False, "readOnlyRootFilesystem": True, "capabilities": {"drop": ["ALL"]}}
     resources = {"requests": {"cpu": "250m", "memory": "512Mi"}, "limits": {"memory": MEMORY.get(name, "1Gi")}}
     volumes: list[dict[str, Any]] = [
         {"name": "secret", "secret": {"secretName": f"keys-{name}"}},

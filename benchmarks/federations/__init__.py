@@ -22,7 +22,7 @@ from benchmarks._targets import Row, show
 from benchmarks.lockstep import PARTS
 
 OTHERS = {"HELICS": "helics", "mosaik": "mosaik"}  # packages; the module of the same name has the processes
-PATIENCE = 120.0  # [s]
+PATIENCE = 120.0  # [s] limit of a federation
 
 
 def main(cycles=1000, repeats=1):
@@ -63,7 +63,7 @@ def measure(package, cycles, core):
             child.kill()
     stamps = [line for line in "".join(output).splitlines() if line.startswith("[")]  # mosaik prints a greeting, too
     if not stamps:
-        raise RuntimeError(f"{package}: the federation did not come together within {PATIENCE:g} s")
+        raise RuntimeError(f"{package}: the federation did not start within {PATIENCE:g} s")
     seconds = [b - a for a, b in pairwise(json.loads(stamps[0]))]
     return seconds[len(seconds) // 10 :]  # without the start-up
 

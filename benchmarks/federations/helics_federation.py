@@ -11,12 +11,7 @@ from benchmarks.lockstep import PARTS
 from lapwing.kernels.row_packing import row_width
 
 WIDTH = {port.name: 8 * row_width(port.like) for _, outputs in PARTS.values() for port in outputs}  # [bytes]
-OFFSET = {
-    "plant": 0.0,
-    "sensors": 0.25,
-    "trajectory": 0.25,
-    "autopilot": 0.5,
-}  # [s] of its step in a cycle of 1 s
+OFFSET = {"plant": 0.0, "sensors": 0.25, "trajectory": 0.25, "autopilot": 0.5}  # [s] of its step in a cycle of 1 s
 
 
 def broker(port):

@@ -139,7 +139,7 @@ def _check_sensor_options(context: typer.Context) -> None:
 def _fit_sensors(flights: list[Path], mapping: str | None, out: Path) -> None:
     from lapwing.studies.flight_import.open_flight import open_flight
     from lapwing.studies.identification.sensor_fit import fit_all
-    from lapwing.studies.identification.toml_tables import dump
+    from lapwing.studies.toml_text import dump
 
     claim(out)
     tables, notes = fit_all([open_flight(path, mapping) for path in flights])

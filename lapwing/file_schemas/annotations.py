@@ -22,6 +22,16 @@ BOUNDS = {
 }
 
 
+def dereference(schema: Schema, node: Schema) -> Schema:
+    """Return a node of a schema with its reference resolved, and its other keys."""
+    while "$ref" in node:
+        target: Any = schema
+        for part in node["$ref"].removeprefix("#/").split("/"):
+            target = target[part]
+        node = {**target, **{key: value for key, value in node.items() if key != "$ref"}}
+    return node
+
+
 def table_schema(cls: type, leave_out: Iterable[str] = ()) -> Schema:
     """Return the schema of a table that a class declares, without some of its keys."""
     result = [key for key in keys(cls) if key.name not in leave_out]

@@ -4,6 +4,7 @@ import re
 from collections.abc import Iterable, Iterator
 from typing import Any
 
+from lapwing.file_schemas.annotations import dereference
 from lapwing.file_schemas.json_schema import SCHEMAS
 
 UNIT = re.compile(r"\[([^\]]+)\]")
@@ -26,12 +27,7 @@ def key_units(keys: Iterable[str]) -> dict[str, str]:
 
 def _nodes(whole: dict[str, Any], node: dict[str, Any], path: list[str]) -> Iterator[dict[str, Any]]:
     """Yield the schemas at the end of a path, through all alternatives."""
-    if (reference := node.get("$ref", "")).startswith("#/"):
-        target: Any = whole
-        for part in reference[2:].split("/"):
-            target = target[part]
-        yield from _nodes(whole, target | {k: v for k, v in node.items() if k != "$ref"}, path)
-        return
+    node = dereference(whole, node)
     if not path:
         yield node
     elif path[0] in node.get("properties", {}):

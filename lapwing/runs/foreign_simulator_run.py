@@ -53,18 +53,12 @@ def on_simulator(scene: Scene, setup: RunConfig, host: str, port: int) -> RunCon
     sensor_ports = [p for p in sensors.ports if p.name in PROVIDED]
     nominal = {p.name: _nominal(p, instruments[p.name].sensor) for p in sensor_ports}
     frame = airframe(scene)
+    imu_period = next(p.period for p in sensor_ports if p.name == ports.IMU)
+    timeouts = scene.lookup("autopilot.start_timeout"), scene.lookup("autopilot.step_timeout")
     simulator = SimulatorSetup(
-        host,
-        port,
-        nominal,
-        motor_order(frame, QUADROTOR_X, "px4"),
-        frame.motor.max_voltage,
-        environment(scene).home,
-        setup.interval_ns,
-        next(p.period for p in sensor_ports if p.name == ports.IMU),
-        scene.lookup("autopilot.start_timeout"),
-        scene.lookup("autopilot.step_timeout"),
-    )
+        host, port, nominal, motor_order(frame, QUADROTOR_X, "px4"), frame.motor.max_voltage, environment(scene).home,
+        setup.interval_ns, imu_period, *timeouts,
+    )  # fmt: skip
     battery = Port(ports.BATTERY, ports.BatteryReading())
     services[NAME] = ServiceConfig(simulator, (InputPort(ports.ACTUATORS, 1),), (*sensor_ports, battery))
     return setup._replace(services=services)

@@ -32,7 +32,7 @@ LINES = 200  # lines of events
 LAG = (0.02, 0.5)  # [s] shortest and longest time over which a step is spread
 ERROR = 0.25  # [m] upper end of the trail's colour scale
 SIZE = 1.0  # [m] size that sets the camera's distance
-FAREWELL = 0.3  # [s] time for browsers to receive the last frame
+FLUSH_TIME = 0.3  # [s] time for browsers to receive the last frame
 
 
 class LivePage:
@@ -81,9 +81,9 @@ class LivePage:
         with self._server.atomic():
             for trail, step in zip(self._trails, steps, strict=True):
                 trail.extend(step)
-            self._tell(steps, events)
+            self._show_events(steps, events)
 
-    def _tell(self, steps: Sequence[FlightData], events: Sequence[list[Event]]) -> None:
+    def _show_events(self, steps: Sequence[FlightData], events: Sequence[list[Event]]) -> None:
         several = len(steps) > 1
         lines = [
             f"{event.time:8.2f}  {f'{step.vehicle}  ' if several else ''}{event.kind}  {event.text}"
@@ -118,11 +118,11 @@ class LivePage:
         with self._ready:
             self._over = True
             self._ready.notify()
-        self._player.join(FAREWELL)
+        self._player.join(FLUSH_TIME)
         self._time.value = f"{self._time.value}, the flight is over"
         if self._server.get_clients():
             self._server.flush()
-            time.sleep(FAREWELL)
+            time.sleep(FLUSH_TIME)
         self._stack.close()
 
 

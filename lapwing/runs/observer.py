@@ -17,32 +17,20 @@ class Observer(Protocol):
 
     def begin(self) -> None:
         """Start the display: the first tick has been stepped."""
-        ...
+        return
 
     def show(self, time_ns: int, pose: bytes | None, status: bytes | None) -> None:
         """Show the progress at `time_ns`, with the newest payloads of the pose and status topics."""
-        ...
+        return
 
     def compiling(self, compilation: Compilation) -> None:
         """Show that kernels are being compiled, until `begin`."""
-        ...
+        return
 
     def say(self, line: str) -> None:
         """Show a line to the user."""
-        ...
+        return
 
 
-class Silent:
+class Silent(Observer):
     """Observer that shows nothing."""
-
-    def begin(self) -> None:
-        """Do nothing."""
-
-    def show(self, time_ns: int, pose: bytes | None, status: bytes | None) -> None:
-        """Do nothing."""
-
-    def compiling(self, compilation: Compilation) -> None:
-        """Do nothing."""
-
-    def say(self, line: str) -> None:
-        """Do nothing."""

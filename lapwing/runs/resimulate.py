@@ -103,7 +103,8 @@ def recorded_run(log: Path, allow_code: bool = False) -> RecordedRun:
             raise ValueError(f"{log}: has FMUs, machine code of their authors ({files}); use --allow-code to run them")
         if external := read.metadata.get("external"):
             raise ValueError(f"{log}: cannot be resimulated: {external} was an external service")
-        recorded = {vehicle: _firmware_messages(read, setup, vehicle) for vehicle in firmware_vehicles(setup)}
+        flown = [own.vehicle for own in members(setup) if any(name in own.services for name in FIRMWARES)]
+        recorded = {vehicle: _firmware_messages(read, setup, vehicle) for vehicle in flown}
         operators = {vehicle: _at(dict(recorded_commands(read, setup, vehicle))) for vehicle in setup.vehicles}
         times = (time_ns for _, _, time_ns, _ in read.messages(read.deterministic_topics()))
         last = max((time_ns // setup.interval_ns for time_ns in times), default=0)
@@ -127,11 +128,6 @@ def resimulate(log: Path, observer: Observer | None = None, allow_code: bool = F
         fly_single(run.setup, new_log, observer=observer, operator=run.operators, last=run.last, recorded=run.firmware)
         with LogReader(new_log) as read:
             return run.digest, read.digest()
-
-
-def firmware_vehicles(setup: RunConfig) -> list[str]:
-    """Return the names of the vehicles that a foreign firmware flies."""
-    return [member.vehicle for member in members(setup) if any(name in member.services for name in FIRMWARES)]
 
 
 def _firmware_messages(read: LogReader, setup: RunConfig, vehicle: str) -> Recorded:

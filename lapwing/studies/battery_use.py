@@ -52,19 +52,11 @@ def battery_use(flight: FlightData) -> BatteryUse | None:
     capacity = float(view.design_capacity[-1])  # [A h]
     landing = flight.outcome.time
     last = int(np.searchsorted(view.times, landing, side="right").clip(1, len(view)) - 1)
+    drawn, left = np.concatenate([[0.0], np.cumsum(steps)]) / WATT_HOUR, float(charge[last])
     return BatteryUse(
-        view.times,
-        charge,
-        voltage,
-        current,
-        np.concatenate([[0.0], np.cumsum(steps)]) / WATT_HOUR,
-        _cutoff(flight, cells),
-        _low_threshold(flight),
-        landing,
-        float(charge[last]),
-        float(charge[last]) * capacity * cells * NOMINAL_VOLTAGE,
-        float(voltage[: last + 1].min()),
-    )
+        view.times, charge, voltage, current, drawn, _cutoff(flight, cells), _low_threshold(flight), landing,
+        left, left * capacity * cells * NOMINAL_VOLTAGE, float(voltage[: last + 1].min()),
+    )  # fmt: skip
 
 
 def _cutoff(flight: FlightData, cells: int) -> float | None:

@@ -51,10 +51,7 @@ def events(
     if setpoint is not None and len(setpoint):
         phases = changes(setpoint.times, setpoint.phase)
         result += [Event(time, "phase", str(phase)) for time, phase in phases if phase]
-    result = [
-        event._replace(time=round(event.time, 9)) for event in result
-    ]  # to nanoseconds, the resolution of the log
-    return in_order(result)
+    return in_order(event._replace(time=round(event.time, 9)) for event in result)  # [ns] resolution of the log
 
 
 def in_order(events: Iterable[Event]) -> list[Event]:

@@ -13,7 +13,7 @@ def hosts(port: int) -> set[str]:
     return {f"{host}:{port}" for host in HOSTS}
 
 
-def refusal(
+def rejection(
     path: str, host: str | None, origins: Collection[str], token: str, known: Collection[str]
 ) -> http.HTTPStatus | None:
     """Return the status with which a request is rejected, or None if it is accepted.

@@ -113,17 +113,12 @@ def _of_estimate(flight: FlightData, armed: np.ndarray) -> dict[str, float]:
     if not flight.has("estimate") or len(flight.estimate) < n:
         return {}
     estimate, truth = flight.estimate, flight.truth
-    places = (
-        strided_view(estimate.position[:n]),
-        strided_view(truth.position[:n]),
-        strided_view(estimate.position_std[:n]),
-    )
+    columns = estimate.position, truth.position, estimate.position_std
+    position, true_position, deviation = (strided_view(column[:n]) for column in columns)
+    shares = _within_3sigma(position, true_position, deviation, plain(armed, bool))
     return {
         **{f"rmse_estimate.{axis}": value for axis, value in flight.rmse_of(estimate).items()},
-        **{
-            f"within_3sigma.{a}": share
-            for a, share in zip("xyz", _within_3sigma(*places, plain(armed, bool)), strict=True)
-        },
+        **{f"within_3sigma.{axis}": share for axis, share in zip("xyz", shares, strict=True)},
     }
 
 

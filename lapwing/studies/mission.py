@@ -15,9 +15,7 @@ class Mission(NamedTuple):
     """Target and end of a mission."""
 
     target: tuple[float, float, float] | None  # [m] world, position at the end; None if unknown before the flight
-    final_phase: str | None = (
-        None  # last phase of a trajectory that ends in the air; None for missions that end with a landing
-    )
+    final_phase: str | None = None  # last phase of a trajectory that ends in the air; None if it ends with a landing
     is_longer: bool = False  # True if the run ends before the trajectory
 
     def completion(self, status: TopicView) -> str:
@@ -40,7 +38,7 @@ def mission_of(setup: RunConfig, start: np.ndarray) -> Mission | None:
     flying = next((setup.services[name] for name in ("autopilot", *FIRMWARES) if name in setup.services), None)
     if flying is None:
         return None
-    if items := _plan_items(flying.parameters):
+    if items := last_upload(flying.parameters, "mission_upload"):
         return Mission(_plan_target(items, start))
     if "trajectory" not in setup.services:
         return None
@@ -68,8 +66,9 @@ def _last_start(path: Parameters) -> float:
     return max(float(path.phase_start[-1]), *(float(c.start[-1]) for c in (path.x, path.y, path.z, path.yaw)))
 
 
-def _plan_items(autopilot: Any) -> tuple[Any, ...]:
-    uploads = [command.items for command in getattr(autopilot, "plan", ()) if command.kind == "mission_upload"]
+def last_upload(autopilot: Any, kind: str) -> tuple[Any, ...]:
+    """Return the items of the last upload of a kind in the plan of an autopilot; empty without one."""
+    uploads = [command.items for command in getattr(autopilot, "plan", ()) if command.kind == kind]
     return tuple(uploads[-1]) if uploads else ()
 
 

@@ -95,6 +95,7 @@ def card(subject: Path) -> list[Row]:
     """
     vehicle, rotor = _vehicle(subject)
     rows, fault = [], hover_loads.power_fault(vehicle, rotor)
+    source = vehicle.published.source if vehicle.published else ""
     for name, (figure, unit, size) in _SHOWN.items():
         stated = getattr(vehicle.published, name.replace(" ", "_"), None)
         computed, reason = None, stated.reason if stated else ""
@@ -105,16 +106,7 @@ def card(subject: Path) -> list[Row]:
             computed = (value[0] if isinstance(value, tuple) else value) / size
         except ValueError as error:
             reason = str(error)
-        rows.append(
-            Row(
-                name,
-                unit,
-                computed,
-                stated.value / size if stated else None,
-                vehicle.published.source if vehicle.published else "",
-                reason,
-            )
-        )
+        rows.append(Row(name, unit, computed, stated.value / size if stated else None, source, reason))
     return rows
 
 

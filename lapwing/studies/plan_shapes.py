@@ -7,6 +7,7 @@ import numpy as np
 
 from lapwing.services.autopilot.commander.fence import Fence
 from lapwing.studies.flight_data import FlightData
+from lapwing.studies.mission import last_upload
 
 ACTIONS = ("waypoint", "loiter_time", "land", "takeoff")  # items with a position
 
@@ -44,8 +45,6 @@ def fence_shapes(flight: FlightData) -> Iterator[FenceShape]:
 def _uploads(flight: FlightData, kind: str) -> tuple[Any, ...]:
     """Return the items of the last upload of a kind in the flight's plan; empty without one."""
     try:
-        plan = getattr(flight.setup.services["autopilot"].parameters, "plan", ())
+        return last_upload(flight.setup.services["autopilot"].parameters, kind)
     except (KeyError, ValueError):
         return ()
-    matching = [command.items for command in plan if command.kind == kind]
-    return tuple(matching[-1]) if matching else ()

@@ -1,14 +1,14 @@
 """Form of a scene: a field for each key, from the JSON schema and the values of the scene."""
 
-import json
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from lapwing.cosim.scene import Scene
 from lapwing.cosim.scene.load import SCENE_FILE
-from lapwing.file_schemas.annotations import Schema
+from lapwing.file_schemas.annotations import Schema, dereference
+from lapwing.studies.toml_text import toml
 
 FIRST = ("run", "vehicle", "trajectory", "effects", "sensors", "environment", "autopilot", "solver", "communication")
 PER_VEHICLE = ("airframe", "mavlink")  # tables of the single vehicles of a fleet
@@ -92,25 +92,6 @@ def plain(value: Any) -> str:
     return value if isinstance(value, str) else toml(value)
 
 
-def toml(value: Any) -> str:
-    """Return a value as TOML on one line. Raise ValueError for other types."""
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, str):
-        return json.dumps(value, ensure_ascii=False)
-    if isinstance(value, int | float):
-        return repr(value)
-    if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{_bare(key)} = {toml(item)}" for key, item in value.items()) + "}"
-    if isinstance(value, list | tuple):
-        return "[" + ", ".join(map(toml, value)) + "]"
-    raise ValueError(f"{value!r}: not a TOML value; use numbers, texts, lists and tables")
-
-
-def _bare(key: str) -> str:
-    return key if re.fullmatch(r"[\w-]+", key, re.ASCII) else json.dumps(key)
-
-
 def _table_at(tree: dict[str, Any], key: str) -> None:
     for part in key.split("."):
         tree = tree.setdefault(part, {}) if isinstance(tree, dict) else {}
@@ -161,11 +142,7 @@ class _Reader:
 
     def _alternative(self, part: Schema, value: Any) -> Schema:
         """Return the schema's alternative that fits a value, with references resolved."""
-        if "$ref" in part:
-            target: Any = self._schema
-            for name in part["$ref"].removeprefix("#/").split("/"):
-                target = target[name]
-            part = {**target, **{k: v for k, v in part.items() if k != "$ref"}}
+        part = dereference(self._schema, part)
         if "anyOf" not in part:
             return part
         choices = [self._alternative(choice, value) for choice in part["anyOf"]]

@@ -4,7 +4,7 @@ import http
 from collections.abc import Awaitable, Callable, MutableMapping
 from typing import Any
 
-from lapwing.studies.local_pages import refusal
+from lapwing.studies.local_pages import rejection
 
 Message = MutableMapping[str, Any]
 Receive = Callable[[], Awaitable[Message]]
@@ -35,7 +35,7 @@ class Guard:
         fields = [(key.lower(), value.decode("latin-1")) for key, value in scope["headers"]]
         host = next((value for key, value in fields if key == b"host"), None)
         origins = [value for key, value in fields if key == b"origin"]
-        status = refusal(scope["path"], host, origins, self._token, self._hosts)
+        status = rejection(scope["path"], host, origins, self._token, self._hosts)
         length = next((value for key, value in fields if key == b"content-length"), "0")
         if status is None and scope["method"] == "POST":
             if not origins:  # browsers send Origin with each form

@@ -23,7 +23,7 @@ from lapwing.studies.view3d import available
 from lapwing.studio.form_fields import additions, form
 from lapwing.studio.recent_flights import RecentFlights
 from lapwing.studio.run_processes import StudioRuns
-from lapwing.studio.scene_changes import SPEEDS, command_line, python, shell_command
+from lapwing.studio.scene_changes import SPEEDS, command_line, python
 from lapwing.studio.scene_forms import form_changes, load_named, posted_form, scene_files, schema, tables
 
 HERE = Path(__file__).parent
@@ -154,16 +154,11 @@ class Pages:
         """Return the command line, the Python code and the faults of a posted form as JSON."""
         name, posted, added = await posted_form(request)
         changed, faults, error = await run_in_threadpool(form_changes, name, posted, added)
+        command = command_line(name, changed, posted.get("speed", ""), posted.get("view") == "yes")
+        keys = [change.key for change in changed]
+        code = python(name, changed)
         return JSONResponse(
-            {
-                "command": shell_command(
-                    command_line(name, changed, posted.get("speed", ""), posted.get("view") == "yes")
-                ),
-                "python": python(name, changed),
-                "changed": [change.key for change in changed],
-                "faults": faults,
-                "error": error,
-            }
+            {"command": shlex.join(command), "python": code, "changed": keys, "faults": faults, "error": error}
         )
 
     async def start(self, request: Request) -> Response:
@@ -196,7 +191,7 @@ class Pages:
             flight=summary,
             previous=others[0] if others else "",
             change_query=urlencode(query),
-            command=shell_command(run.command),
+            command=shlex.join(run.command),
             python=python(run.scene, run.changed),
             duration=load_named(run.scene, run.changed)[Run].duration if run.running else 0.0,
         )

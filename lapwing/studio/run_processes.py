@@ -30,14 +30,12 @@ class StudioRun:
         self.number, self.scene, self.changed, self.speed, self.view = number, scene, tuple(changed), speed, view
         self.command = command_line(scene, changed, speed, view)
         self.lines: list[str] = []
-        self.live, self.sim_time, self.rate = (
-            "",
-            0.0,
-            0.0,
-        )  # address of the 3D view; [s]; simulation time over wall time
+        self.live = ""  # address of the 3D view
+        self.sim_time, self.rate = 0.0, 0.0  # [s]; simulation time over wall time
         self.result: dict[str, Any] = {}
         self.code: int | None = None
-        self._json, self._stopped = folder / f"{number}.json", False
+        self._json = folder / f"{number}.json"
+        self.stopped = False  # True if the user ended the run
         words = [sys.executable, "-m", "lapwing", *self.command[1:], "--json", str(self._json)]
         self._process = subprocess.Popen(
             words,
@@ -79,11 +77,6 @@ class StudioRun:
         return Path(self.result["log"]) if "log" in self.result else None
 
     @property
-    def stopped(self) -> bool:
-        """True if the run was ended by the user."""
-        return self._stopped
-
-    @property
     def error(self) -> str:
         """Last line of the output of a run that failed without a result; "" otherwise."""
         if self.running or not self.code or self.result:
@@ -104,7 +97,7 @@ class StudioRun:
     def stop(self) -> None:
         """Interrupt the run, which then writes its log and report."""
         if self._process.poll() is None:
-            self._stopped = True
+            self.stopped = True
             self._process.send_signal(signal.SIGINT)
 
     def end(self) -> None:

@@ -1,12 +1,12 @@
 """Changes of a scene in the form: overrides, and the equivalent command line and Python code."""
 
 import re
-import shlex
 import tomllib
 from collections.abc import Iterable, Mapping
 from typing import Any, NamedTuple
 
-from lapwing.studio.form_fields import Field, toml
+from lapwing.studies.toml_text import toml
+from lapwing.studio.form_fields import Field
 
 SPEEDS = ("1", "2", "5", "10", "max")  # selectable values of --speed
 
@@ -59,11 +59,6 @@ def command_line(scene: str, changed: Iterable[Change], speed: str, view: bool) 
     for change in changed:
         words += ["--set", change.override]
     return [*words, *(["--speed", speed] if speed else []), *(["--view"] if view else [])]
-
-
-def shell_command(words: Iterable[str]) -> str:
-    """Return a command as text for a shell."""
-    return shlex.join(words)
 
 
 def python(scene: str, changed: Iterable[Change]) -> str:

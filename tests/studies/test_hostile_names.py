@@ -52,7 +52,7 @@ def plot():
 
 
 def table():
-    return SimpleNamespace(title=HOSTILE, heads=[HOSTILE] * 2, rows=[[HOSTILE] * 2], failed=())
+    return SimpleNamespace(title=HOSTILE, caption=HOSTILE, heads=[HOSTILE] * 2, rows=[[HOSTILE] * 2], failed=())
 
 
 def pages():
@@ -72,14 +72,14 @@ def pages():
             outcome_text=HOSTILE,
             failure=failure,
             facts={HOSTILE: HOSTILE},
-            heads=[HOSTILE],
+            labels=[HOSTILE],
             worst=[row],
             vehicles={HOSTILE: [HOSTILE]},
             vehicle_heads=[HOSTILE],
             vehicle_title=HOSTILE,
             nearest=HOSTILE,
-            refused=[(1, HOSTILE)],
-            refusals=1,
+            rejected=[(1, HOSTILE)],
+            rejections=1,
         ),
     )
 

@@ -530,7 +530,7 @@ def test_estimate_errors_and_rejections(log):
     expected = np.zeros(9)
     expected[0] = ESTIMATE_ERROR
     assert error == pytest.approx(np.broadcast_to(expected, error.shape), abs=1e-9)
-    assert estimator.refusals(FlightData.read(log)) == "Measurements rejected: gps 2, sonar 1."
+    assert estimator.rejections(FlightData.read(log)) == "Measurements rejected: gps 2, sonar 1."
 
 
 def test_attitude_error_is_in_body_frame(tmp_path):

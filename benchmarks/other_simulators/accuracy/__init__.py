@@ -1,7 +1,7 @@
 """Other simulators on problems of the accuracy study.
 
-A file has `NAME`, `MODULE` (the package whose version is printed) and `ways(case)`, its methods on a problem (none if
-it cannot represent the problem).
+A file has `NAME`, `MODULE` (the package whose version is printed) and `methods(case)`, which returns its methods on a
+problem, none if it cannot represent the problem.
 """
 
 import numpy as np

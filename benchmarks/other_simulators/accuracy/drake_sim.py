@@ -7,13 +7,7 @@ import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import (
-    BallRpyJoint,
-    QuaternionFloatingJoint,
-    RevoluteJoint,
-    SpatialInertia,
-    UnitInertia,
-)
+from pydrake.multibody.tree import BallRpyJoint, QuaternionFloatingJoint, RevoluteJoint, SpatialInertia, UnitInertia
 from pydrake.systems.analysis import ApplySimulatorConfig, Simulator, SimulatorConfig
 
 from benchmarks.other_simulators.accuracy import matrix, outcome
@@ -56,12 +50,12 @@ def plant_of(case: str) -> tuple[MultibodyPlant, Any, list[Any]]:
     return plant, body, rotors
 
 
-def ways(case: str) -> list[SolverMethod]:
+def methods(case: str) -> list[SolverMethod]:
     module = MODULES[case]
     R_start = matrix(np.array(module.START.attitude))
     omega_start = np.array(module.START.omega_body)
 
-    def way(scheme: str) -> SolverMethod:
+    def solver_method(scheme: str) -> SolverMethod:
         plant, body, rotors = plant_of(case)
         simulator = Simulator(plant)
         context = simulator.get_mutable_context()
@@ -104,4 +98,4 @@ def ways(case: str) -> list[SolverMethod]:
 
         return SolverMethod(f"Drake {scheme}", SCHEMES[scheme], "tol", TOLERANCES, prepare, read, lambda: None)
 
-    return [way(scheme) for scheme in SCHEMES]
+    return [solver_method(scheme) for scheme in SCHEMES]

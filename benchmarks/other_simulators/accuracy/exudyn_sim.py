@@ -39,12 +39,14 @@ def system(case: str) -> tuple[Any, int]:
     return system, body["bodyNumber"]
 
 
-def ways(case: str) -> list[SolverMethod]:
+def methods(case: str) -> list[SolverMethod]:
     if case not in CASES:
         return []
     module, coarsest = CASES[case]
 
-    def way(name: str, order: int, unit: str, values: list[float], adapt: Callable[[Any, float], None]) -> SolverMethod:
+    def solver_method(
+        name: str, order: int, unit: str, values: list[float], adapt: Callable[[Any, float], None]
+    ) -> SolverMethod:
         main, body = system(case)
 
         def prepare(value: float) -> Callable[[], Any]:
@@ -78,7 +80,7 @@ def ways(case: str) -> list[SolverMethod]:
 
     steps = [coarsest / 2**k for k in range(HALVINGS)]
     return [
-        way("RK44", 4, "s", steps, fixed),
-        way("RK67", 6, "s", steps, fixed),
-        way("DOPRI5", 5, "tol", list(TOLERANCES), tolerance),
+        solver_method("RK44", 4, "s", steps, fixed),
+        solver_method("RK67", 6, "s", steps, fixed),
+        solver_method("DOPRI5", 5, "tol", list(TOLERANCES), tolerance),
     ]

@@ -60,10 +60,10 @@ CASES: dict[str, tuple[Callable[[str], str], Any, slice, slice, float]] = {
 }
 
 
-def ways(case: str) -> list[SolverMethod]:
+def methods(case: str) -> list[SolverMethod]:
     describe, module, turn, omega, coarsest = CASES[case]
 
-    def way(integrator: str) -> SolverMethod:
+    def solver_method(integrator: str) -> SolverMethod:
         model = mujoco.MjModel.from_xml_string(describe(integrator))
         data = mujoco.MjData(model)
 
@@ -87,4 +87,4 @@ def ways(case: str) -> list[SolverMethod]:
         steps = [coarsest / 2**k for k in range(HALVINGS)]
         return SolverMethod(f"MuJoCo {integrator}", INTEGRATORS[integrator], "s", steps, prepare, read, lambda: None)
 
-    return [way(integrator) for integrator in INTEGRATORS]
+    return [solver_method(integrator) for integrator in INTEGRATORS]

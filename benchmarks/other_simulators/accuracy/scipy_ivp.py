@@ -37,12 +37,12 @@ def rate(t, s, inertia, h, moment):
     ])  # fmt: skip
 
 
-def ways(case: str) -> list[SolverMethod]:
+def methods(case: str) -> list[SolverMethod]:
     inertia, h, moment, module = CASES[case]
     start = np.array([*module.START.attitude, *module.START.omega_body])
     numbers = (np.array(inertia), np.array(h), moment)
 
-    def way(method: str) -> SolverMethod:
+    def solver_method(method: str) -> SolverMethod:
         def prepare(tolerance: float) -> Callable[[], Any]:
             keys = {"method": method, "rtol": max(tolerance, 3e-14), "atol": tolerance, "args": numbers}
             return lambda: solve_ivp(rate, (0.0, module.DURATION), start, **keys)
@@ -54,4 +54,4 @@ def ways(case: str) -> list[SolverMethod]:
         return SolverMethod(f"SciPy {method}", METHODS[method], "tol", TOLERANCES, prepare, read, lambda: None)
 
     rate(0.0, start, *numbers)
-    return [way(method) for method in METHODS]
+    return [solver_method(method) for method in METHODS]

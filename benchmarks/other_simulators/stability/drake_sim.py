@@ -99,7 +99,7 @@ def vehicle(angle: float, friction: float) -> Model:
     return model
 
 
-def way(angle: float, seconds: float) -> float:
+def creep_distance(angle: float, seconds: float) -> float:
     """Return the distance [m] that it moves on a slope [rad] after 3 s at rest."""
     model = vehicle(angle, slopes.STATIC)
     model.run_on(3.0)
@@ -115,7 +115,7 @@ def standing() -> Errors:
     model.joint.set_translational_velocity(model.context, [1.0, 0.0, 0.0])
     model.run_on(2.0)
     left = float(np.abs(model.velocity_world()).max())
-    return {"creep": {DISCRETE: way(math.radians(20.0), 600.0)}, "stick_slip": {DISCRETE: left}}
+    return {"creep": {DISCRETE: creep_distance(math.radians(20.0), 600.0)}, "stick_slip": {DISCRETE: left}}
 
 
 def sliding() -> Errors:
@@ -127,7 +127,10 @@ def sliding() -> Errors:
     model.run_on(0.5)
     exact = landing.G * (math.sin(a) - slopes.DYNAMIC * math.cos(a))
     off = abs(float(np.linalg.norm(model.velocity_world() - early)) / 0.5 / exact - 1.0)
-    return {"below": {DISCRETE: way(math.radians(slopes.EDGE - slopes.MARGIN), 60.0)}, "beyond": {DISCRETE: off}}
+    return {
+        "below": {DISCRETE: creep_distance(math.radians(slopes.EDGE - slopes.MARGIN), 60.0)},
+        "beyond": {DISCRETE: off},
+    }
 
 
 def falls(axis: int, angle: float) -> bool:

@@ -54,7 +54,7 @@ def run_on(model: Any, data: Any, seconds: float) -> Any:
     return data
 
 
-def way(angle: float, seconds: float) -> float:
+def creep_distance(angle: float, seconds: float) -> float:
     """Return the distance [m] that it moves on a slope [rad] after 3 s at rest."""
     model, data = vehicle(angle, slopes.STATIC)
     before = run_on(model, data, 3.0).qpos[:3].copy()
@@ -66,7 +66,7 @@ def standing() -> Errors:
     model, data = vehicle(0.0, slopes.DYNAMIC)
     run_on(model, data, 3.0).qvel[0] = 1.0
     left = float(np.abs(run_on(model, data, 2.0).qvel[:3]).max())
-    return {"creep": {CONTACT: way(math.radians(20.0), 600.0)}, "stick_slip": {CONTACT: left}}
+    return {"creep": {CONTACT: creep_distance(math.radians(20.0), 600.0)}, "stick_slip": {CONTACT: left}}
 
 
 def sliding() -> Errors:
@@ -77,7 +77,10 @@ def sliding() -> Errors:
     late = run_on(model, data, 0.5).qvel[:3]
     exact = landing.G * (math.sin(a) - slopes.DYNAMIC * math.cos(a))
     off = abs(float(np.linalg.norm(late - early)) / 0.5 / exact - 1.0)
-    return {"below": {CONTACT: way(math.radians(slopes.EDGE - slopes.MARGIN), 60.0)}, "beyond": {CONTACT: off}}
+    return {
+        "below": {CONTACT: creep_distance(math.radians(slopes.EDGE - slopes.MARGIN), 60.0)},
+        "beyond": {CONTACT: off},
+    }
 
 
 def falls(axis: int, angle: float) -> bool:

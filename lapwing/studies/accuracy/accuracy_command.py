@@ -9,7 +9,7 @@ from rich.console import Console
 
 from lapwing.kernels import statistics
 from lapwing.services.common.vehicle_schema import Effects
-from lapwing.studies import terminal
+from lapwing.studies import json_file, terminal
 from lapwing.studies.accuracy import console_output, error_budget, round_off, scenes
 from lapwing.studies.accuracy import work_precision_plot as picture
 from lapwing.studies.accuracy.error_budget import ErrorSource
@@ -81,10 +81,20 @@ def show(screen: Console, study: Study) -> None:
 
 
 def write_json(path: Path, study: Study) -> None:
-    """Write all points for other programs."""
-    console_output.write_json(
-        path, study.target, study.problem, study.points, study.selected, study.parts, study.rounding, study.cost
-    )
+    """Write all points, and for a scene its error sources and the cost [ns] of a plant step."""
+    data = {
+        "target": study.target,
+        "title": study.problem.title,
+        "duration": study.problem.duration,
+        "time_unit": study.problem.unit,
+        "reference": study.problem.source,
+        "points": study.points,
+        "cheapest": study.selected,
+        "round_off": study.rounding,
+        "error_sources": study.parts,
+        "step_ns": dict(zip(("hovering", "in contact"), study.cost, strict=True)) if study.cost else None,
+    }
+    json_file.write_json(path, data)
 
 
 def plot(path: Path, study: Study) -> None:

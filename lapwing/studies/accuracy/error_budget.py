@@ -70,30 +70,23 @@ def errors(scene: Scene) -> list[ErrorSource]:
     exact = flight_with(1, coupling, fine_solver(1))
     for step in (interval / n for n in STEPS if interval / n <= longest_step(scene)):
         flight = flight_with(1, coupling, [f"solver.step={step!r}", f"solver.accuracy={REFERENCE_ACCURACY!r}"])
-        parts.append(
-            _error_source(SOURCES[0], step, f"{scene_integrator(scene)}, step {1e3 * step:g} ms", flight, exact)
-        )
+        label = f"{scene.lookup('solver.integrator')}, step {1e3 * step:g} ms"
+        parts.append(_error_source(SOURCES[0], step, label, flight, exact))
     for accuracy in ACCURACIES if has_contact(scene) else ():
         flight = flight_with(1, coupling, fine_solver(1, accuracy))
         parts.append(_error_source(SOURCES[1], accuracy, f"accuracy {accuracy:g}", flight, exact))
     sequential = {
         factor: flight_with(factor, "gauss_seidel", fine_solver(factor)) for factor in (*RATE_FACTORS, REFERENCE_RATE)
     }
+    finest = sequential[REFERENCE_RATE]
     for factor in RATE_FACTORS:
         label = f"{rate * factor} Hz"
-        parts.append(
-            _error_source(SOURCES[2], interval / factor, label, sequential[factor], sequential[REFERENCE_RATE])
-        )
+        parts.append(_error_source(SOURCES[2], interval / factor, label, sequential[factor], finest))
     for factor in RATE_FACTORS:
         label = f"Jacobi at {rate * factor} Hz"
         parallel = flight_with(factor, "jacobi", fine_solver(factor))
         parts.append(_error_source(SOURCES[3], interval / factor, label, parallel, sequential[factor]))
     return parts
-
-
-def scene_integrator(scene: Scene) -> str:
-    """Return the name of the scene's integrator."""
-    return str(scene.lookup("solver.integrator"))
 
 
 def has_contact(scene: Scene) -> bool:
@@ -131,11 +124,11 @@ def difference(one: FlightData, other: FlightData) -> tuple[float, float, float]
 
     They are compared at the ticks of the flight with fewer ticks.
     """
-    coarse, fine_solver = (one, other) if one.setup.interval >= other.setup.interval else (other, one)
-    stride = round(coarse.setup.interval / fine_solver.setup.interval)
-    n = min(len(coarse.truth), -(-len(fine_solver.truth) // stride))
+    coarse, fine = (one, other) if one.setup.interval >= other.setup.interval else (other, one)
+    stride = round(coarse.setup.interval / fine.setup.interval)
+    n = min(len(coarse.truth), -(-len(fine.truth) // stride))
     p, q = coarse.truth.position[:n], coarse.truth.orientation[:n]
-    r, s = fine_solver.truth.position[::stride][:n], fine_solver.truth.orientation[::stride][:n]
+    r, s = fine.truth.position[::stride][:n], fine.truth.orientation[::stride][:n]
     # twice the arc sine of half the chord, which is accurate for small angles, unlike the arc cosine
     chord = np.minimum(np.linalg.norm(q - s, axis=1), np.linalg.norm(q + s, axis=1))
     angle = 4.0 * np.arcsin(np.minimum(0.5 * chord, math.sqrt(0.5)))

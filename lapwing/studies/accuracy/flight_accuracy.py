@@ -28,9 +28,7 @@ STRICTER = 1e-3  # factor of the accuracy in contact
 STRICTEST = LEAST_ACCURACIES["ground_contact"]  # limit of the accuracy in contact by round-off
 MISSING = "missing; set the error to compare with, e.g. --set solver.accuracy=1e-4"
 WorkFunction = Callable[[Callable[[int], None]], Any]  # flies, and calls its argument with the current tick
-Progress = Callable[
-    [RunConfig, str, WorkFunction], Any
-]  # of a run and the description of the work, whose result it returns
+Progress = Callable[[RunConfig, str, WorkFunction], Any]  # (run, description, work) -> result of the work
 
 
 class ClosedLoop(NamedTuple):

@@ -29,7 +29,7 @@ def show(console: Console, result: FlightAccuracy) -> None:
 
 
 def _table(result: FlightAccuracy) -> Table:
-    fleet = _is_fleet(result)
+    fleet = len({quantity.vehicle for quantity in result.quantities}) > 1
     closed_loop = {(q.vehicle, q.name): q for q in result.closed_loop.quantities} if result.closed_loop else {}
     table = Table(box=SIMPLE, pad_edge=False, padding=(0, 0) if closed_loop else (0, 1))  # within 80 columns
     names = ["solver error" if result.part_length else "largest error", "/ accuracy", "at (s)"]
@@ -97,10 +97,6 @@ def _remedy(result: FlightAccuracy) -> list[str]:
     cause = "solver.step: selected for a gentler flight"
     count = math.ceil((result.worst.error / result.accuracy) ** (1.0 / integrators.get(result.integrator).ORDER))
     return [f"{cause}; use --set solver.integrator={result.integrator} --set solver.step={result.step / count:.12g}"]
-
-
-def _is_fleet(result: FlightAccuracy) -> bool:
-    return len({quantity.vehicle for quantity in result.quantities}) > 1
 
 
 def write_json(path: Path, result: FlightAccuracy) -> None:

@@ -69,7 +69,7 @@ def jumping_voltages(p: MultirotorParameters, t: float) -> tuple[float, ...]:
 
 
 def varying_voltages(p: MultirotorParameters, t: float) -> tuple[float, ...]:
-    """Return voltages [V] that jump by a tenth, each motor by itself. See `jumping_voltages` for arguments.
+    """Return voltages [V] that jump by a tenth, independently for each motor. See `jumping_voltages` for arguments.
 
     At a limit of a motor or the flow steps are under error control, so those of `jumping_voltages` do not show the
     error of steps between limits.
@@ -187,12 +187,10 @@ def problem(scene: Scene, manoeuvre: Voltages = gentle_voltages) -> Problem:
     return Problem(
         f"{scene.name}: its multirotor in the air under {'prescribed' if gentle else manoeuvre.__name__.split('_')[0]} "
         "voltages",
-        "s",
         duration,
         [solver_method(name) for name in integrators.compatible_methods(p, state.motion)],
         lambda: coordinates(motion, prepare_flight(rkmk54, FINEST)())[-1],
         f"rkmk54 with {FINEST} steps per communication step",
-        {},
     )
 
 

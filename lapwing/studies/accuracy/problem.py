@@ -1,6 +1,7 @@
 """Problems with a known solution, and the methods that solve them."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -37,9 +38,10 @@ class Problem(NamedTuple):
     """An initial value problem with its reference solution and the methods to compare."""
 
     title: str
-    unit: str  # unit of time
     duration: float
     methods: Sequence[SolverMethod]
     reference: Callable[[], np.ndarray]  # final coordinates, shape (n,)
     source: str  # description of the reference
-    invariants: dict[str, Callable[[np.ndarray, np.ndarray], np.ndarray]]  # (times, samples) -> values, shape (k, ...)
+    invariants: Mapping[str, Callable[[np.ndarray, np.ndarray], np.ndarray]] = MappingProxyType({})
+    """By name: (times, samples) -> values, shape (k, ...)."""
+    unit: str = "s"  # unit of time

@@ -66,12 +66,10 @@ def _fixed_step_problem(scene: Scene, p: Any, x: Any) -> Problem:
 
     return Problem(
         f"{scene.name}: its plant",
-        "s",
         ticks * interval,
         fixed_step_methods(p, x, ticks * interval, ticks),
         reference,
         f"rkmk54 with {FINEST} steps per communication step",
-        {},
     )
 
 

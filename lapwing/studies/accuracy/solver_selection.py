@@ -144,17 +144,8 @@ def _cache_file(scene: Scene, names: tuple[str, ...]) -> Path | None:
         *(f"lapwing.dynamics.effects.{name}" for name in scene[Effects].tables),
     ]
     digest = hashlib.blake2b(source_digest(modules).encode(), digest_size=8)
-    run = scene[Run]
-    manoeuvres = [voltages.__name__ for voltages in plant.MANOEUVRES]
-    for part in (
-        names,
-        manoeuvres,
-        run.seed,
-        scene[Vehicle].name,
-        run.duration,
-        scene[Communication].rate,
-        dict(scene[Effects].tables),
-        scenes.physics(scene),
-    ):
+    run, manoeuvres = scene[Run], [voltages.__name__ for voltages in plant.MANOEUVRES]
+    flight = names, manoeuvres, run.seed, scene[Vehicle].name, run.duration, scene[Communication].rate
+    for part in (*flight, dict(scene[Effects].tables), scenes.physics(scene)):
         digest.update(repr(part).encode())
     return folder / "accuracy" / f"{scene.name}-{digest.hexdigest()}.json"

@@ -48,14 +48,8 @@ def _refine(problem: Problem, method: SolverMethod, exact: np.ndarray, longest: 
         seconds, result = clock(method.prepare(setting))
         outcome = method.read(setting, result)
         if outcome is not None and np.isfinite(outcome.samples).all():
-            end_error = error(outcome.samples[-1], exact)
-            seconds_net = max(seconds - idle, 1e-7)
-            drifts = drift(problem, outcome)
-            points.append(
-                Point(
-                    method.name, method.order, method.unit, setting, end_error, seconds_net, outcome.evaluations, drifts
-                )
-            )
+            measured = error(outcome.samples[-1], exact), max(seconds - idle, 1e-7), outcome.evaluations
+            points.append(Point(method.name, method.order, method.unit, setting, *measured, drift(problem, outcome)))
         if seconds > longest or _refinement_is_useless([p.error for p in points]):
             break
     return points

@@ -1,1 +1,1 @@
-"""Campaign: one scene with many seeds, and how its figures are distributed."""
+"""Campaign: many runs of one scene, and the distributions of their metrics."""

@@ -5,13 +5,13 @@ from typing import NamedTuple
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from lapwing.studies.campaign.campaign_plots import label_and_factor
 from lapwing.studies.campaign.folder import read
 from lapwing.studies.campaign.results import Results
 from lapwing.studies.campaign.statistics import Interval, interval, paired_difference
 from lapwing.studies.metrics import METRICS
+from lapwing.studies.terminal import table
 
 PLAN_ENTRIES = ("scene", "overrides", "vary", "sweep", "design", "versions")  # of a manifest; they define the flights
 
@@ -68,10 +68,7 @@ def compare(one: Path, other: Path) -> Comparison:
                 differences.append(Difference(name, *means, paired_difference(x[is_finite], y[is_finite])))
     count = len(pairs)
     failures = interval(int(count - success_a.sum()), count), interval(int(count - success_b.sum()), count)
-    only_first, only_second = (
-        int(((success_a == 1) & (success_b == 0)).sum()),
-        int(((success_a == 0) & (success_b == 1)).sum()),
-    )
+    only_first, only_second = int((success_a < success_b).sum()), int((success_b < success_a).sum())
     total = len(set(_pairs(a)) | set(_pairs(b)))
     keys = [key for key in a.folder.plan.keys if key in b.folder.plan.keys]
     different_values = [
@@ -79,7 +76,7 @@ def compare(one: Path, other: Path) -> Comparison:
     ]
     differing = [name for name in PLAN_ENTRIES if a.folder.about[name] != b.folder.about[name]] + different_values
     return Comparison(
-        (str(one), str(other)), differing, count, total - count, failures, only_second, only_first, differences
+        (str(one), str(other)), differing, count, total - count, failures, only_first, only_second, differences
     )
 
 
@@ -96,14 +93,11 @@ def show(console: Console, comparison: Comparison) -> None:
         console.print(f"  {name}: failures {p.value:.2%}, 95 % interval {p.low:.2%} to {p.high:.2%}")
     console.print(f"  failed in the first only: {comparison.only_first}, in the second only: {comparison.only_second}")
     title = "Means, and change from the first to the second with its 95 % interval"
-    table = Table(title=title, title_justify="left", box=None, pad_edge=False)
-    table.add_column("metric", no_wrap=True)
-    for head in ("first", "second", "change", "from", "to"):
-        table.add_column(head, justify="right", no_wrap=True)
+    rows = table("metric", "first", "second", "change", "from", "to", title=title, box=None, pad_edge=False)
     for d in comparison.differences:
         label, scale = ("success [%]", 100.0) if d.figure == "success" else label_and_factor(d.figure)
         means = (f"{scale * mean:.4g}" for mean in (d.one, d.other))
         changes = (f"{scale * change:+.3g}" for change in d.difference)
-        table.add_row(f"{label}{' *' if d.is_significant else ''}", *means, *changes)
-    console.print(table)
+        rows.add_row(f"{label}{' *' if d.is_significant else ''}", *means, *changes)
+    console.print(rows)
     console.print("*: the interval excludes 0")

@@ -202,10 +202,8 @@ def parallel(results: Results) -> Plot:
         raise NotRecordedError("only one parameter varies")
     columns, ticks = [], []
     for name in names:
-        values, (label, scale) = (
-            results.number(name),
-            label_and_factor(name) if name in METRICS else (with_unit(results, name), 1.0),
-        )
+        values = results.number(name)
+        label, scale = label_and_factor(name) if name in METRICS else (with_unit(results, name), 1.0)
         low, high = np.nanmin(values), np.nanmax(values)
         columns.append((values - low) / (high - low if high > low else 1.0))
         texts = texts_of(results, name)

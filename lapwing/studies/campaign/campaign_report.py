@@ -105,7 +105,7 @@ def _page(results: Results, sections: list[Section]) -> str:
         }
         for row in results.worst(WORST)
     ]
-    refused = zip(results.rejected["run"].tolist(), results.rejected["outcome_text"].tolist(), strict=True)
+    rejected = zip(results.rejected["run"].tolist(), results.rejected["outcome_text"].tolist(), strict=True)
     return render(
         "campaign.html",
         title=_title(results),
@@ -118,8 +118,8 @@ def _page(results: Results, sections: list[Section]) -> str:
         vehicle_heads=console_output.VEHICLE_COLUMNS,
         vehicle_title=console_output.VEHICLES,
         nearest=console_output.nearest_of(results) if results.vehicles else "",
-        refused=list(refused)[:WORST],
-        refusals=len(results.rejected["run"]),
+        rejected=list(rejected)[:WORST],
+        rejections=len(results.rejected["run"]),
         sections=sections,
     )
 

@@ -6,12 +6,12 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from lapwing.studies import json_file
 from lapwing.studies.campaign.fleet_columns import NEAREST
 from lapwing.studies.campaign.results import Results
 from lapwing.studies.consistency import JOINT, SOURCES, bounds
+from lapwing.studies.terminal import table
 from lapwing.studies.tracking import AXES, unit_and_factor
 
 VEHICLE_FIGURES = ("rmse.x", "rmse.y", "rmse.z", "max_distance", "touchdown.speed")
@@ -75,25 +75,21 @@ def consistency_lines(results: Results) -> list[str]:
 
 
 def _vehicles(console: Console, results: Results) -> None:
-    table = Table(title=VEHICLES, title_justify="left")
-    table.add_column("vehicle", no_wrap=True)
-    for column in VEHICLE_COLUMNS:
-        table.add_column(column, justify="right", no_wrap=True)
+    rows = table("vehicle", *VEHICLE_COLUMNS, title=VEHICLES)
     for vehicle, cells in vehicle_cells(results).items():
-        table.add_row(vehicle, *cells)
-    console.print(table)
+        rows.add_row(vehicle, *cells)
+    console.print(rows)
     console.print(f"Smallest separation of two vehicles: {nearest_of(results)}")
 
 
 def vehicle_cells(results: Results) -> dict[str, list[str]]:
     """Return the cells of `VEHICLE_COLUMNS` for each vehicle of a fleet."""
-    return {vehicle: _cells(results, vehicle) for vehicle in results.vehicles}
-
-
-def _cells(results: Results, vehicle: str) -> list[str]:
-    spreads = [results.spread(f"{vehicle}.{name}") for name in VEHICLE_FIGURES]
-    share = f"{results[f'{vehicle}.success'].astype(bool).mean():.1%}"
-    return [*(f"{s.worst:.4f}" if s else "" for s in spreads), share]
+    cells = {}
+    for vehicle in results.vehicles:
+        spreads = [results.spread(f"{vehicle}.{name}") for name in VEHICLE_FIGURES]
+        share = f"{results[f'{vehicle}.success'].astype(bool).mean():.1%}"
+        cells[vehicle] = [*(f"{s.worst:.4f}" if s else "" for s in spreads), share]
+    return cells
 
 
 def nearest_of(results: Results) -> str:
@@ -112,13 +108,8 @@ def _list(console: Console, label: str, runs: Sequence[int], texts: Sequence[str
 
 
 def _table(console: Console, title: str, kind: str, results: Results) -> None:
-    table = Table(title=title, title_justify="left")
-    table.add_column("axis", no_wrap=True)
-    for column in ("5 %", "median", "95 %", "worst", "in run"):
-        table.add_column(column, justify="right", no_wrap=True)
-    if results.published:
-        table.add_column(results.source, justify="right")
-        table.add_column("worst / published", justify="right")
+    published_heads = (results.source, "worst / published") if results.published else ()
+    rows = table("axis", "5 %", "median", "95 %", "worst", "in run", *published_heads, title=title)
     for axis in AXES:
         s, (unit, scale) = results.spread(f"{kind}.{axis}"), unit_and_factor(axis)
         if s is None:
@@ -126,9 +117,9 @@ def _table(console: Console, title: str, kind: str, results: Results) -> None:
         row = [f"{axis} [{unit}]", *(digits(scale * v) for v in (s.low, s.median, s.high, s.worst)), str(s.run)]
         if published := results.published.get(f"rmse.{axis}"):
             row += [digits(scale * published), f"{s.worst / published:.3f}"]
-        table.add_row(*row)
-    if table.row_count:  # empty without a reference, as for a flight plan
-        console.print(table)
+        rows.add_row(*row)
+    if rows.row_count:  # empty without a reference, as for a flight plan
+        console.print(rows)
 
 
 def digits(value: float) -> str:

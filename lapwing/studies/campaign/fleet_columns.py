@@ -32,7 +32,7 @@ def joint_row(flights: Mapping[str, FlightData], by_vehicle: Mapping[str, Row], 
 
     Args:
         flights: flights by vehicle name.
-        of_each: metrics by vehicle name.
+        by_vehicle: metrics by vehicle name.
         required: `[success]` by vehicle name.
     """
     result: Row = {name: _worst(name, [row[name] for row in by_vehicle.values()]) for name in METRICS}

@@ -26,7 +26,7 @@ MAX_RUNS = 10_000_000  # limit of a campaign
 
 
 class Plan(NamedTuple):
-    """Plan of a campaign: scene, runs and what varies."""
+    """Plan of a campaign: scene, runs and varied keys."""
 
     path: str  # path or name of the scene
     overrides: tuple[str, ...]
@@ -121,7 +121,7 @@ def _random_bits(seed: int, run: int, key: str) -> int:
 
 
 def _random_unit(seed: int, run: int, key: str) -> float:
-    """Return a number in (0, 1). See `_word`."""
+    """Return a number in (0, 1). See `_random_bits`."""
     return ((_random_bits(seed, run, key) >> 12) + 0.5) * 2.0**-52
 
 

@@ -74,7 +74,7 @@ def first_setup(plan: Plan) -> tuple[int, RunConfig]:
     """Return the number and run configuration of the first run that the scene accepts.
 
     Raises:
-        SceneError: the scene is invalid, or rejects the first `TRIED` runs and as many others.
+        SceneError: the scene is invalid, or rejects the first `TRIAL_RUNS` runs and as many others.
     """
     first_error = None
     spread_runs = np.linspace(0, plan.runs - 1, TRIAL_RUNS, dtype=int).tolist()  # the first runs of a grid are similar

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
 from lapwing.studies.campaign.folder import Folder
@@ -16,12 +17,12 @@ class Count(NamedTuple):
 
     runs: int = 0
     successes: int = 0
-    kinds: tuple[tuple[str, int], ...] = ()  # number of runs by outcome
+    kinds: Mapping[str, int] = MappingProxyType({})  # number of runs by outcome
 
     @property
     def accepted(self) -> int:
         """Number of runs that the scene accepted."""
-        return self.runs - dict(self.kinds).get(REJECTED, 0)
+        return self.runs - self.kinds.get(REJECTED, 0)
 
     @property
     def failures(self) -> int:
@@ -34,19 +35,17 @@ class Count(NamedTuple):
         return interval(self.failures, self.accepted)
 
     def __add__(self, other: "Count") -> "Count":  # type: ignore[override]
-        kinds = {kind: dict(self.kinds).get(kind, 0) + dict(other.kinds).get(kind, 0) for kind in (*KINDS, REJECTED)}
-        counts = tuple((kind, n) for kind, n in kinds.items() if n)
-        return Count(self.runs + other.runs, self.successes + other.successes, counts)
+        kinds = Counter(self.kinds) + Counter(other.kinds)
+        return Count(self.runs + other.runs, self.successes + other.successes, kinds)
 
     def __str__(self) -> str:
-        return ", ".join(f"{n} {kind}" for kind, n in self.kinds)
+        return ", ".join(f"{self.kinds[kind]} {kind}" for kind in (*KINDS, REJECTED) if kind in self.kinds)
 
 
 def count(rows: Iterable[Row]) -> Count:
     """Return the counts of some rows."""
     table = list(rows)
-    kinds = Counter(row["outcome"] for row in table)
-    return Count() + Count(len(table), sum(row["success"] for row in table), tuple(kinds.items()))
+    return Count(len(table), sum(row["success"] for row in table), Counter(row["outcome"] for row in table))
 
 
 def campaign(

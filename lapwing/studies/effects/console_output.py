@@ -6,12 +6,12 @@ from pathlib import Path
 from matplotlib.figure import Figure
 from rich.box import SIMPLE
 from rich.console import Console
-from rich.table import Table
 
 from lapwing.studies import json_file
 from lapwing.studies.effects.procedure import Influence, Row, Study
 from lapwing.studies.report.matplotlib_figure import plot_style
 from lapwing.studies.report.style import BOUND, DPI, FLOWN, WIDTH
+from lapwing.studies.terminal import table
 
 MIN_BAR = 1e-6  # [m] length of the shortest bars
 
@@ -26,7 +26,7 @@ def show(console: Console, study: Study) -> None:
     console.print(
         f"Smallest set within {study.within:g} m: {', '.join(study.smallest) or 'none'} "
         f"(distance {study.distance:.2g} m; "
-        f"saves {saved[0]:.0%} of a step hovering, {saved[1]:.0%} on the ground)",
+        f"saves {saved[0]:.0%} of a step hovering, {saved[1]:.0%} on the ground)"
     )
     console.print('Costs after "<" are below the resolution of the measurement.')
     names = ", ".join(row.name for row in study.missing)
@@ -37,17 +37,15 @@ def _table(console: Console, title: str, study: Study, active: bool) -> None:
     if not _sorted_rows(study, active):
         return
     console.print(title)
-    table = Table(box=SIMPLE, pad_edge=False, collapse_padding=True)  # 80 columns hold all digits
-    table.add_column("effect", no_wrap=True)
-    for column in ("hovering\n[ns]", "share", "on ground\n[ns]", "path [m]", "end [m]", "energy"):
-        table.add_column(column, justify="right", no_wrap=True)
+    heads = ("effect", "hovering\n[ns]", "share", "on ground\n[ns]", "path [m]", "end [m]", "energy")
+    rows = table(*heads, box=SIMPLE, pad_edge=False, collapse_padding=True)  # 80 columns hold all digits
     for row in _sorted_rows(study, active):
         if row.influence is None:
             continue
         ratio = f"{row.airborne / study.airborne:.0%}" if row.airborne > study.noise[0] else ""
         airborne, standing = _cost(row.airborne, study.noise[0]), _cost(row.standing, study.noise[1])
-        table.add_row(row.name, airborne, ratio, standing, *_changes(row.influence))
-    console.print(table)
+        rows.add_row(row.name, airborne, ratio, standing, *_changes(row.influence))
+    console.print(rows)
     for row in _sorted_rows(study, active):
         if row.remark:
             console.print(f"  not flown: {row.remark}", soft_wrap=True)
@@ -90,9 +88,7 @@ def plot(path: Path, study: Study) -> None:
         influence, cost = figure.subplots(1, 2, sharey=True)
         distances = [row.influence.trajectory for row in rows if row.influence]
         longest = max([e for e in distances if math.isfinite(e)] + [10.0 * study.within])
-        lengths = [
-            min(max(e, MIN_BAR), 3.0 * longest) if e > 0.0 else 0.0 for e in distances
-        ]  # no bar without a change
+        lengths = [min(max(e, MIN_BAR), 3.0 * longest) if e > 0.0 else 0.0 for e in distances]
         colours = [FLOWN if row.active else "#9CC3DD" for row in rows]
         influence.barh(names, lengths, color=colours)
         influence.axvline(study.within, color=BOUND, linewidth=1.2, label=f"tolerance {study.within:g} m")

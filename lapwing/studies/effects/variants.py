@@ -4,6 +4,7 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
+from functools import partial
 from typing import Any
 
 from lapwing.cosim.scene import Scene
@@ -32,11 +33,6 @@ def check_effects(scene: Scene, tables: Tables) -> str:
     return ""
 
 
-def fly_for_truth(scene: Scene) -> FlightData:
-    """Fly the scene to its end. Return a flight with the ground truth alone."""
-    return fly(scene, (TRUTH,))
-
-
 class VariantPool:
     """Pool of processes that fly variants of one scene; each set of effects is compiled once and cached on disk."""
 
@@ -44,8 +40,8 @@ class VariantPool:
         self._scene, self._pool = scene, pool
 
     def fly(self, variants: Iterable[Tables]) -> Iterator[FlightData]:
-        """Yield the flight of each variant, in order."""
-        return self._pool.map(fly_for_truth, [variant(self._scene, tables) for tables in variants])
+        """Yield the flight of each variant in order, with the ground truth alone."""
+        return self._pool.map(partial(fly, only=(TRUTH,)), [variant(self._scene, tables) for tables in variants])
 
 
 @contextmanager

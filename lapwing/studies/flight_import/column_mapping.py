@@ -96,18 +96,13 @@ class Mapping(_Table):
         }
 
 
-def shipped_mappings() -> list[str]:
-    """Return the names of the included mappings."""
-    return sorted(f.name.removesuffix(".toml") for f in files(__package__).joinpath("mappings").iterdir())
-
-
 def load_mapping(name: str) -> Mapping:
     """Read a mapping by the name of an included one, or by the path of a TOML file.
 
     Raises:
         ValueError: the mapping does not exist or is invalid.
     """
-    shipped = shipped_mappings()
+    shipped = sorted(f.name.removesuffix(".toml") for f in files(__package__).joinpath("mappings").iterdir())
     if name in shipped:
         text = files(__package__).joinpath("mappings", f"{name}.toml").read_text(encoding="utf-8")
     else:

@@ -10,14 +10,7 @@ from lapwing.studies.flight_import.column_mapping import SCALES, Mapping, Motors
 from lapwing.studies.flight_import.csv_table import read_columns
 from lapwing.studies.flight_import.recording import GYRO_LIMIT, LONGEST_GAP, SETPOINT_WIDTH, Recording, widen
 from lapwing.studies.flight_import.time_alignment import describe
-from lapwing.studies.rotation_arrays import (
-    body_rate,
-    continuous,
-    from_euler,
-    from_ned_frd,
-    ned_to_enu,
-    unit,
-)
+from lapwing.studies.rotation_arrays import body_rate, continuous, from_euler, from_ned_frd, ned_to_enu, unit
 
 FASTEST_TURN = 40.0  # [rad/s] mean rate between two measured attitudes above which tracking is lost
 FASTEST = 20.0  # [m/s] mean speed between two measured positions above which tracking is lost

@@ -88,7 +88,7 @@ def read_dataflash_flight(path: Path) -> Recording:
 
 @contextmanager
 def _silent() -> Iterator[None]:
-    """Discard what pymavlink prints for each damaged byte; its indexer in C does not use `sys.stderr`."""
+    """Discard the lines that pymavlink prints for each damaged byte; its indexer in C does not use `sys.stderr`."""
     kept = os.dup(2)
     try:
         with open(os.devnull, "wb") as null:
@@ -120,6 +120,7 @@ def _messages(path: Path) -> tuple[dict[str, Columns], dict[str, float], set[str
     messages = MessageColumns({name: ("TimeUS", *fields) for name, fields in USED.items()})
     primary: dict[str, int] = {}
     cores, parameters, unknown = set(), {}, set()
+    unreadable = f"{path}: is not a readable dataflash log; expected a .bin or .log file of ArduPilot"
     try:
         kind = DFReader_binary if path.suffix.lower() == ".bin" else DFReader_text
         with _silent(), _open_reader(kind, path) as reader:
@@ -139,12 +140,10 @@ def _messages(path: Path) -> tuple[dict[str, Columns], dict[str, float], set[str
                     unknown.add(name)
     except OSError as error:
         raise ValueError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
-    except Exception:  # pymavlink raises what its parser runs into
-        raise ValueError(
-            f"{path}: is not a readable dataflash log; expected a .bin or .log file of ArduPilot"
-        ) from None
+    except Exception:  # pymavlink raises exceptions of many types
+        raise ValueError(unreadable) from None
     if not len(messages):
-        raise ValueError(f"{path}: is not a readable dataflash log; expected a .bin or .log file of ArduPilot")
+        raise ValueError(unreadable)
     columns, sessions = messages.longest_session()
     notes = [f"EKF core {', '.join(map(str, sorted(cores)))} was primary"] if cores - {0} else []
     return columns, parameters, unknown - {"FMT", "FMTU", "UNIT", "MULT"}, [*notes, *session_notes(sessions)]

@@ -47,13 +47,13 @@ def read_log_flight(path: Path) -> Recording:
         raise ValueError(f"{path}: shorter than {50 * interval:g} s; expected a flight")
     grid = times[0] + interval * np.arange(int((times[-1] - times[0]) / interval + ROUNDING) + 1)
     volts = _latest(grid, flight.times("actuators"), flight.actuators.motor_voltage)
-    omega, force = _sample(grid, times, truth.angular_velocity), np.full((len(grid), 3), np.nan)
+    omega, force = Series(times, truth.angular_velocity).at(grid), np.full((len(grid), 3), np.nan)
     if flight.has("imu") and len(flight.topic("imu")) > 1:
         imu, at = flight.topic("imu"), flight.times("imu")
-        omega, force = _sample(grid, at, imu.angular_velocity), _sample(grid, at, imu.linear_acceleration)
-    quaternion = unit(_sample(grid, times, continuous(truth.orientation[:, [3, 0, 1, 2]])))
+        omega, force = Series(at, imu.angular_velocity).at(grid), Series(at, imu.linear_acceleration).at(grid)
+    quaternion = unit(Series(times, continuous(truth.orientation[:, [3, 0, 1, 2]])).at(grid))
     battery = np.full(len(grid), np.nan)
-    position, velocity = _sample(grid, times, truth.position), _sample(grid, times, truth.velocity)
+    position, velocity = Series(times, truth.position).at(grid), Series(times, truth.velocity).at(grid)
     measured = [v for v in (position, velocity, quaternion) if np.isfinite(v).any()]
     valid = np.isfinite(np.column_stack([*measured, omega, volts])).all(axis=1) & ~_in_gap(grid, times)
     return Recording(
@@ -99,10 +99,6 @@ def _readings(flight: FlightData, begin: float) -> dict[str, Series]:
         finite = np.isfinite(columns).all(axis=1)
         out[name] = Series.of(flight.times(topic)[finite] - begin, columns[finite])
     return out
-
-
-def _sample(grid: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarray:
-    return np.column_stack([np.interp(grid, times, column) for column in np.asarray(values).T])
 
 
 def _latest(grid: np.ndarray, times: np.ndarray, values: np.ndarray) -> np.ndarray:

@@ -13,7 +13,7 @@ import numpy as np
 
 from lapwing.studies.flight_import.channels import FLU, Channels, to_recording
 from lapwing.studies.flight_import.message_columns import NumberRows, RowLengthError
-from lapwing.studies.flight_import.recording import Recording, Series
+from lapwing.studies.flight_import.recording import Recording, Series, convert
 from lapwing.studies.rotation_arrays import from_ned_frd, ned_to_enu, rotate, unit
 
 PULSE_LOW, PULSE_SPAN = 1000.0, 1000.0  # [us]
@@ -73,8 +73,7 @@ def read_rosbag_flight(path: Path, vehicle: str | None = None) -> Recording:
     channels = Channels(unknown=unknown)
 
     def part(name: str, columns: slice, change: Callable[[np.ndarray], np.ndarray] = np.asarray) -> Series | None:
-        source = series.get(name)
-        return source and Series(source.time, change(source.values[:, columns]), source.dropped)
+        return convert(series.get(name), lambda v: change(v[:, columns]))
 
     ros, px4 = "sensor_msgs/msg/", "px4_msgs/msg/"
     pose = "nav_msgs/msg/Odometry" if "nav_msgs/msg/Odometry" in series else "geometry_msgs/msg/PoseStamped"
@@ -144,9 +143,8 @@ def _series(path: Path, vehicle: str | None) -> tuple[dict[str, Series], tuple[s
     except Exception:  # rosbags raises exceptions of many types
         raise ValueError(f"{path}: is not a readable rosbag2; expected {_EXPECTED[path.is_dir()]}") from None
     tables = {kind: numbers.to_array() for kind, numbers in rows.items()}
-    return {kind: Series.of(table[:, 0], table[:, 1:]) for kind, table in tables.items() if table.shape[1] > 1}, tuple(
-        unknown
-    )
+    series = {kind: Series.of(table[:, 0], table[:, 1:]) for kind, table in tables.items() if table.shape[1] > 1}
+    return series, tuple(unknown)
 
 
 class VehicleError(ValueError):

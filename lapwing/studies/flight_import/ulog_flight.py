@@ -102,19 +102,14 @@ def _duty(topics: dict[str, dict[str, Any]], series: Any, channels: Channels) ->
         data = topics["actuator_motors"]
         used = [f for f in data if f.startswith("control[") and np.isfinite(data[f]).any()]
         channels.notes.append("motor commands from actuator_motors")
-        source = series("actuator_motors", *used) if used else None
-        return source and Series(source.time, np.nan_to_num(source.values), source.dropped)
+        return convert(series("actuator_motors", *used), np.nan_to_num) if used else None
     if "actuator_outputs" not in topics:
         return None
     data = topics["actuator_outputs"]
     outputs = [f"output[{k}]" for k in range(int(np.max(data.get("noutputs", 0))))]
     used = [name for name in outputs if name in data and np.ptp(data[name]) > 0.0] or ["output[0]"]
     channels.notes.append("motor commands from actuator_outputs")
-    source = series("actuator_outputs", *used)
-    if source is None:
-        return None
-    pulses = source.values.max() > 2.0
-    return Series(source.time, (source.values - PULSE_LOW) / PULSE_SPAN if pulses else source.values, source.dropped)
+    return convert(series("actuator_outputs", *used), lambda v: (v - PULSE_LOW) / PULSE_SPAN if v.max() > 2.0 else v)
 
 
 def _setpoint(series: Any, vector: Any) -> Series | None:
@@ -140,8 +135,8 @@ def _attitude_setpoint(series: Any) -> Series | None:
     quaternion = series(topic, *(f"q_d[{k}]" for k in range(4)))
     euler = series(topic, "roll_body", "pitch_body", "yaw_body")
     if quaternion is not None and np.linalg.norm(quaternion.values, axis=1).all():
-        return Series(quaternion.time, to_euler(from_ned_frd(unit(quaternion.values))))
-    return euler and Series(euler.time, to_euler(from_ned_frd(from_euler(euler.values))))
+        return convert(quaternion, lambda v: to_euler(from_ned_frd(unit(v))))
+    return convert(euler, lambda v: to_euler(from_ned_frd(from_euler(v))))
 
 
 def _optical_flow(series: Any) -> Series | None:
@@ -179,7 +174,7 @@ def _readings(series: Any, vector: Any) -> dict[str, Series]:
     """Return the readings of each sensor, from the estimator's topic if the log has it, otherwise from the driver's."""
 
     def scale(source: Series | None, *factors: float) -> Series | None:
-        return source and Series(source.time, source.values * factors)
+        return convert(source, lambda v: v * factors)
 
     def gps(topic: str) -> Series | None:  # degrees and metres were integers until PX4 1.14
         return series(topic, "latitude_deg", "longitude_deg", "altitude_msl_m") or scale(
@@ -187,8 +182,7 @@ def _readings(series: Any, vector: Any) -> dict[str, Series]:
         )
 
     def gps_velocity(topic: str) -> Series | None:
-        source = series(topic, "vel_n_m_s", "vel_e_m_s", "vel_d_m_s")
-        return source and Series(source.time, ned_to_enu(source.values), source.dropped)
+        return convert(series(topic, "vel_n_m_s", "vel_e_m_s", "vel_d_m_s"), ned_to_enu)
 
     driver = series("sensor_baro", "pressure")
     if driver and np.median(driver.values) < HIGHEST_HPA:  # hPa until PX4 1.13

@@ -4,10 +4,10 @@ from pathlib import Path
 
 import numpy as np
 from rich.console import Console
-from rich.table import Table
 
 from lapwing.studies import json_file
 from lapwing.studies.identification.procedure import Identification
+from lapwing.studies.terminal import table
 from lapwing.studies.validation.console_output import UNITS
 from lapwing.studies.validation.prediction_metrics import FIELDS
 
@@ -17,12 +17,11 @@ CORRELATED = 0.8  # correlation of two estimates above which it is printed
 def show(console: Console, identification: Identification) -> None:
     """Print estimates, correlations, undetermined parameters, and the errors on held-out flights."""
     fit = identification.fit
-    table = Table(title=f"{identification.scene}: output error on {len(identification.used)} flights")
-    for head in ("parameter", "before", "estimate", "standard error"):
-        table.add_column(head, justify="left" if head == "parameter" else "right")
+    title = f"{identification.scene}: output error on {len(identification.used)} flights"
+    rows = table("parameter", "before", "estimate", "standard error", title=title)
     for key, before, value, error in zip(fit.keys, fit.start, fit.values, fit.standard_errors, strict=True):
-        table.add_row(key, f"{before:.5g}", f"{value:.5g}", f"{error:.2g}")
-    console.print(table)
+        rows.add_row(key, f"{before:.5g}", f"{value:.5g}", f"{error:.2g}")
+    console.print(rows)
     for line in identification.skipped:
         console.print(f"left out: {line}", soft_wrap=True)
     for i, j in zip(*np.triu_indices(len(fit.keys), 1), strict=True):

@@ -19,7 +19,7 @@ from lapwing.services.scene_resolver import load_one
 from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.identification.flight_parameters import KEYS, apply_flight_parameters, is_flight_parameter
 from lapwing.studies.identification.output_error import HORIZONS, Fit, OutputError
-from lapwing.studies.identification.toml_tables import dump
+from lapwing.studies.toml_text import dump
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.prediction_metrics import magnitudes, pool_flights
 from lapwing.studies.validation.procedure import USABLE, read_flights

@@ -69,16 +69,8 @@ def info(path: str | Path) -> Info:
         instants = [t for of_topic in times.values() for t in of_topic[:: max(1, len(of_topic) - 1)]]
         span = (min(instants) * 1e-9, max(instants) * 1e-9) if instants else (0.0, 0.0)
         size = Path(path).stat().st_size
-        return Info(
-            Path(path),
-            size,
-            log.metadata,
-            tuple(log.attachments),
-            log.complete,
-            *span,
-            topics,
-            log.incompatible_types(),
-        )
+        files, versions = tuple(log.attachments), log.incompatible_types()
+        return Info(Path(path), size, log.metadata, files, log.complete, *span, topics, versions)
 
 
 def _topic(name: str, kind: str, times_ns: np.ndarray, size: int) -> Topic:

@@ -5,7 +5,7 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from jinja2 import Environment, FileSystemLoader
+from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_tracking import AXES
@@ -20,7 +20,10 @@ from lapwing.studies.tracking import unit_and_factor
 OPEN = ("timeline", "position")  # sections that are initially open
 CSS_CLASSES = {"landed": "good", "completed": "good"}  # by kind of outcome; "bad" for all others
 _HERE = Path(__file__).parent
-_TEMPLATES = Environment(loader=FileSystemLoader(_HERE), autoescape=True, trim_blocks=True, lstrip_blocks=True)
+_LOADER = FileSystemLoader(_HERE)
+_TEMPLATES = Environment(
+    loader=_LOADER, autoescape=True, trim_blocks=True, lstrip_blocks=True, undefined=StrictUndefined
+)
 
 
 class Accuracy(NamedTuple):

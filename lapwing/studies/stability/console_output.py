@@ -32,10 +32,10 @@ def distance(bound: float, measured: float) -> str:
 
 
 COLUMNS = {  # name: share of the width; None: width of FIGURES
-    "case": 3, "invariant": 6, "method": 5, "bound": None, "measured": None, "away": None, "verdict": None,
+    "case": 3, "invariant": 6, "method": 5, "bound": None, "measured": None, "margin": None, "verdict": None,
     "baseline method": 5, "its result": None,
 }  # fmt: skip
-FIGURES = {"bound": 8, "measured": 8, "away": 8, "verdict": 7, "its result": 13}  # letters
+FIGURES = {"bound": 8, "measured": 8, "margin": 8, "verdict": 7, "its result": 13}  # letters
 
 
 def table(console: Console, results: Sequence[Result]) -> None:

@@ -4,9 +4,9 @@ import math
 from collections.abc import Iterator
 
 from rich.console import Console
-from rich.table import Table
 
 from lapwing.services.autopilot.margins import Margins
+from lapwing.studies.terminal import table
 from lapwing.studies.tracking import AXES, unit_and_factor
 from lapwing.studies.tune.corners import failure
 from lapwing.studies.tune.gain_refinement import rmse
@@ -65,12 +65,10 @@ def tables(tuning: Tuning) -> Iterator[Rows]:
 def show(console: Console, tuning: Tuning) -> None:
     """Print the tables, failures in red."""
     for rows in tables(tuning):
-        table = Table(title=rows.title, title_justify="left")
-        for k, head in enumerate(rows.heads):
-            table.add_column(head, justify="right" if k else "left", no_wrap=True)
+        shown = table(*rows.heads, title=rows.title)
         for k, row in enumerate(rows.rows):
-            table.add_row(*row, style="bold red" if k in rows.failed else None)
-        console.print(table)
+            shown.add_row(*row, style="bold red" if k in rows.failed else None)
+        console.print(shown)
     for text in tuning.failures:
         console.print(f"new gains fail: {text}", style="bold red", soft_wrap=True)
 

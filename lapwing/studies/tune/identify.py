@@ -100,9 +100,8 @@ def _signals(flight: FlightData, p: Parameters, tick: float) -> _Signals:
     low_pass, derivative = _filters(tick)
     response = np.column_stack([lfilter(*low_pass, vertical[:n]), lfilter(*derivative, rates[:n], axis=0)])
     flying = armed[:n] & (height[:n] > height[0] + MIN_HEIGHT)
-    settled = (
-        np.convolve(~flying, np.ones(round(10.0 / FILTER_BANDWIDTH / tick)))[:n] == 0
-    )  # the filters have settled after the take-off
+    # the filters have settled after the take-off
+    settled = np.convolve(~flying, np.ones(round(10.0 / FILTER_BANDWIDTH / tick)))[:n] == 0
     return _Signals(demand, response, settled)
 
 

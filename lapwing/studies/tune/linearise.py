@@ -69,16 +69,13 @@ def hover(scene: Scene) -> Hover:
     d = STEP * speed
 
     def slope(direction: np.ndarray, value: Callable[[Any], float]) -> float:
-        return (value(at_hover(rotors + d * direction, volts)) - value(at_hover(rotors - d * direction, volts))) / (
-            2.0 * d
-        )
+        after, before = (at_hover(rotors + sign * direction, volts) for sign in (d, -d))
+        return (value(after) - value(before)) / (2.0 * d)
 
     one = np.ones(count)
     thrust = slope(one, lambda o: o.thrust[free])
-    ahead = [
-        at_hover(rotors, volts, from_roll_pitch_yaw(0.0, sign * STEP, 0.0)).acceleration_world[0]
-        for sign in (-1.0, 1.0)
-    ]
+    tilted = [at_hover(rotors, volts, from_roll_pitch_yaw(0.0, pitch, 0.0)) for pitch in (-STEP, STEP)]
+    ahead = [o.acceleration_world[0] for o in tilted]
 
     def angular_acceleration_per_thrust(k: int) -> float:
         return slope(turns[k], lambda o: o.angular_acceleration_body[k]) / thrust
@@ -92,15 +89,6 @@ def hover(scene: Scene) -> Hover:
         (more.rotor_acceleration[most] - less.rotor_acceleration[most]) / yawing[most]
     )
     yaw = turn + per_acceleration / (lag * thrust)  # at constant voltage a speed perturbation decays with 1 / lag
-    return Hover(
-        float(speed),
-        float(voltage),
-        float(lag),
-        float(thrust),
-        float(slope(one, lambda o: o.acceleration_world[2]) / thrust),
-        float(roll),
-        float(pitch),
-        float(yaw),
-        float(per_acceleration / (thrust * yaw)),
-        float((ahead[1] - ahead[0]) / (2.0 * STEP)),
-    )
+    altitude, tilt = slope(one, lambda o: o.acceleration_world[2]) / thrust, (ahead[1] - ahead[0]) / (2.0 * STEP)
+    spin_up_zero = per_acceleration / (thrust * yaw)
+    return Hover(*map(float, (speed, voltage, lag, thrust, altitude, roll, pitch, yaw, spin_up_zero, tilt)))

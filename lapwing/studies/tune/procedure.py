@@ -17,6 +17,7 @@ from lapwing.services.common.run_schema import follows_trajectory
 from lapwing.services.common.vehicle_schema import Vehicle
 from lapwing.studies.campaign.campaign_config import campaign_setup
 from lapwing.studies.flight_data import FlightData
+from lapwing.studies.toml_text import dump
 from lapwing.studies.tune import corners, gain_refinement
 from lapwing.studies.tune.bandwidths import Bandwidths
 from lapwing.studies.tune.design import DELAY, assumed_airframe, design, gain_set, shortfalls
@@ -118,10 +119,5 @@ def _review(name: str, parameters: Parameters, plant: Airframe, tick: float) -> 
 
 def write(path: Path, gains: GainSet) -> None:
     """Write a gain set to a TOML file for `autopilot.gains`."""
-    lines = ["# Force demand [N] of every rotor, or tilt [rad], per [m] or [rad]: P, I, D"]
-    for key, value in gains.model_dump().items():
-        if isinstance(value, tuple):
-            value = list(value)
-        text = f'"{value}"' if isinstance(value, str) else str(value).lower()
-        lines.append(f"{key} = {text}")
-    write_text(path, "\n".join(lines) + "\n")
+    head = "# Force demand [N] of every rotor, or tilt [rad], per [m] or [rad]: P, I, D\n"
+    write_text(path, head + dump(gains.model_dump()))

@@ -31,7 +31,7 @@ def show(console: Console, validation: Validation) -> None:
     memory = validation.memory
     console.print(
         f"start: measured state; rotor speeds from past commands; trim from the past {memory.force:g} s (force) and "
-        f"{memory.torque:g} s (torque); 95 % intervals over flights",
+        f"{memory.torque:g} s (torque); 95 % intervals over flights"
     )
     for line in validation.warnings:
         console.print(f"warning: {line}", soft_wrap=True)

@@ -10,7 +10,10 @@ import numpy as np
 
 from lapwing.cosim.scene import Overrides, Scene, SceneError
 from lapwing.dynamics import simd_batch
+from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.dynamics.effects._types import Motion
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, evaluate, motion_of
+from lapwing.kernels import kernel
 from lapwing.kernels.row_packing import pack_row, row_width
 from lapwing.services.common.communication_schema import Communication, Rates
 from lapwing.services.common.vehicle_schema import Effects, airframe
@@ -63,7 +66,7 @@ class PlantRows:
         self.interval = interval
         self._base = _with_wrench(load_one(scene, overrides))
         self._rate, self._step = rate, interval / steps
-        first = self._resolve({})
+        first = _plant(self._scene({}))
         self._core = first.core
         self.like = simd_batch.member(first.core.vehicle, first.start.vehicle)
         self.motion = row_width(self.like.motion)
@@ -152,14 +155,9 @@ class PlantRows:
 
     def power(self, blocks: np.ndarray, n: int) -> np.ndarray:
         """Return the electrical power [W] of the first n vehicles after their last tick, shape (n,)."""
-        from lapwing.studies.validation.plant_power import electrical_power
-
         out = np.empty(len(blocks) * LANES)
-        electrical_power(self.like, blocks.reshape(-1), blocks.shape[1], out, 0, len(blocks))
+        _electrical_power(self.like, blocks.reshape(-1), blocks.shape[1], out, 0, len(blocks))
         return out[:n]
-
-    def _resolve(self, values: Mapping[str, Any]) -> Any:
-        return _plant(self._scene(values))
 
     def _scene(self, values: Mapping[str, Any]) -> Scene:
         """Return the scene with all rates set to that of the recording."""
@@ -182,6 +180,25 @@ class PlantRows:
             raise SceneError("effects", "a parameter set has other effects than the scene", "the same effects")
         mass = airframe(scene).mass
         return pack_row(member), mass.total, mass.matrix
+
+
+@kernel
+def _electrical_power(like: Any, memory: Any, columns: int, out: Any, first: int, last: int) -> None:
+    """Write the power [W] of the motors of each member at its last voltages.
+
+    Args:
+        like: prototype, a Member of `lapwing.dynamics.simd_batch`.
+        memory: blocks of the batch, flat.
+        columns: number of columns of a block.
+        out: result, shape (members,).
+        first: first block.
+        last: block after the last.
+    """
+    for m in range(first * LANES, last * LANES):
+        x = simd_batch.take(like, memory, (m // LANES) * columns * LANES + m % LANES)
+        drive = MultirotorDrive(x.parameters, x.body, x.memory, x.voltage)
+        _, rotors, _, _ = evaluate(drive, x.start, motion_of(x.parameters.layout, x.motion))
+        out[m] = total(rotors.power)
 
 
 def _pad(values: np.ndarray, count: int) -> np.ndarray:

@@ -51,7 +51,7 @@ def thrust_ratio(flight: Recording, starts: np.ndarray, states: StartStates) -> 
     if the measured force is not positive.
     """
     acceleration = (flight.velocity[starts + 1] - flight.velocity[starts]) / flight.interval
-    measured = _in_body(flight.attitude[starts], acceleration + UPWARD)[:, 2]
+    measured = rotate(conjugate(flight.attitude[starts]), acceleration + UPWARD)[:, 2]
     predicted = measured - states.residual[0, starts, 2]
     force = float(np.median(measured))
     return float(np.median(predicted)) / force if force > 0.0 else np.nan
@@ -135,7 +135,7 @@ def compare(flight: Recording, starts: np.ndarray, horizons: tuple[int, ...], pr
     """Return predicted minus measured values."""
     at = starts[:, None] + np.array(horizons)
     attitude = product(conjugate(flight.attitude[at]), predicted[..., 3:7])
-    middle = _in_body(predicted[..., 3:7], predicted[..., 13:16] + UPWARD)
+    middle = rotate(conjugate(predicted[..., 3:7]), predicted[..., 13:16] + UPWARD)
     force = 0.5 * (flight.specific_force[at] + flight.specific_force[at - 1])
     return Errors(
         predicted[..., :3] - flight.position[at],
@@ -149,9 +149,3 @@ def compare(flight: Recording, starts: np.ndarray, horizons: tuple[int, ...], pr
 
 def _power(flight: Recording) -> np.ndarray:
     return flight.power if len(flight.power) == len(flight) else np.full(len(flight), np.nan)
-
-
-def _in_body(attitude: np.ndarray, vector: np.ndarray) -> np.ndarray:
-    """Return world vectors in body coordinates."""
-
-    return rotate(conjugate(attitude), vector)

@@ -1,4 +1,4 @@
-"""Moving bodies of a flight: poses over time, solids, rotors, and links between bodies."""
+"""Moving bodies of a flight: poses over time, solids, rotors, and links and cables between bodies."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -9,6 +9,7 @@ from lapwing.studies.flight_data import FlightData
 from lapwing.studies.view3d.solids import Solid
 
 LEVEL = (0.0, 0.0, 0.0, 1.0)  # x, y, z, w
+PARTS = 12  # number of segments of a drawn cable
 
 
 class Rotor(NamedTuple):
@@ -57,16 +58,29 @@ def body_of_truth(flight: FlightData, solids: Sequence[Solid], rotors: Sequence[
 def recorded_bodies(flight: FlightData, shapes: Sequence[tuple[Sequence[Solid], Sequence[Rotor]]]) -> tuple[Body, ...]:
     """Return the bodies of the topic `body_states` in its order, with the solids and rotors of each in `shapes`."""
     states = flight.topic("body_states")
-    names = states.name[0]
+    names, position, orientation, force = states.name[0], states.position, states.orientation, states.force
     return tuple(
-        Body(
-            str(names[k]),
-            states.times,
-            states.position[:, k],
-            states.orientation[:, k],
-            tuple(solids),
-            tuple(rotors),
-            states.force[:, k],
-        )
+        Body(str(names[k]), states.times, position[:, k], orientation[:, k], tuple(solids), tuple(rotors), force[:, k])
         for k, (solids, rotors) in enumerate(shapes)
     )
+
+
+def cable(start: np.ndarray, stop: np.ndarray, length: float) -> np.ndarray:
+    """Return points from `start` to `stop` [m], shape (PARTS + 1, 3); they sag if `length` [m] exceeds the distance."""
+    points = np.linspace(start, stop, PARTS + 1)
+    if length > float(np.linalg.norm(stop - start)):
+        points += _sag(start, stop, length)
+    return points
+
+
+def _sag(start: np.ndarray, stop: np.ndarray, length: float) -> np.ndarray:
+    """Return the offsets of a slack cable from its chord [m], a parabola of about its length, shape (PARTS + 1, 3)."""
+    chord = stop - start
+    distance = float(np.linalg.norm(chord))
+    depth = np.sqrt(3.0 * distance * (length - distance) / 8.0) if distance > 0.0 else length / 2.0
+    down = np.array([0.0, 0.0, -1.0])
+    across = down - chord * float(down @ chord) / max(distance * distance, 1e-9)
+    size = float(np.linalg.norm(across))
+    across = across / size if size > 1e-3 else np.array([1.0, 0.0, 0.0])  # a vertical chord bends to one side
+    share = np.linspace(0.0, 1.0, PARTS + 1)
+    return (depth * 4.0 * share * (1.0 - share))[:, None] * across

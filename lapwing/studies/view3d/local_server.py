@@ -9,7 +9,7 @@ from functools import cache
 from typing import Any
 from unittest import mock
 
-from lapwing.studies.local_pages import ADDRESS, hosts, refusal
+from lapwing.studies.local_pages import ADDRESS, hosts, rejection
 
 _LOCK = threading.Lock()  # one server starts at a time: the guard is installed by a patch during the start
 
@@ -74,7 +74,7 @@ class Guard:
 
     def rejection(self, path: str, headers: Any) -> http.HTTPStatus | None:
         """Return the status of a rejection, or None if the request is accepted."""
-        return refusal(path, headers.get("Host"), headers.get_all("Origin") or [], self._token, self.hosts)
+        return rejection(path, headers.get("Host"), headers.get_all("Origin") or [], self._token, self.hosts)
 
     def __call__(self, connection: Any, request: Any) -> Any:
         """Return the response to a request, or None to accept a websocket."""

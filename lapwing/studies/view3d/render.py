@@ -39,9 +39,7 @@ class Shot(NamedTuple):
     speed: float = 1.0  # simulation time over video time
     camera: str = "follow"
     size: tuple[int, int] = (960, 540)  # [pixel]
-    place: tuple[float, float, float] | None = (
-        None  # camera position relative to the vehicle, over its size; None: that of `camera`
-    )
+    place: tuple[float, float, float] | None = None  # camera relative to the vehicle, over its size; None: `camera`
 
 
 def check(target: Path, shot: Shot) -> None:

@@ -5,9 +5,10 @@ from typing import NamedTuple
 import numpy as np
 
 from lapwing.studies.flight_data import FlightData
+from lapwing.studies.rotation_arrays import from_euler
 from lapwing.studies.view3d.beams import BeamSamples, beams
 from lapwing.studies.view3d.bodies import Body, Motion
-from lapwing.studies.view3d.sampling import from_angles, nearest, round_angle, round_to_grid
+from lapwing.studies.view3d.sampling import nearest, round_angle, round_to_grid
 from lapwing.studies.view3d.scans import Scans, scans
 
 
@@ -51,7 +52,7 @@ def sample(flight: FlightData, motion: Motion, times: np.ndarray, points: int = 
     desired = attitude = error = None
     if len(flight.reference):
         last = np.minimum(rows, len(flight.reference) - 1)
-        desired, attitude = flight.reference[last, :3], from_angles(flight.reference[last, 3:])
+        desired, attitude = flight.reference[last, :3], round_to_grid(from_euler(flight.reference[last, 3:]))
         error = np.linalg.norm(path - desired, axis=1)
     estimate = estimate_attitude = std = None
     if flight.has("estimate"):
@@ -67,20 +68,9 @@ def sample(flight: FlightData, motion: Motion, times: np.ndarray, points: int = 
     bodies = [_body(body, times, rows) for body in motion.bodies]
     distances, clouds = beams(flight, times), scans(flight, times, points) if points else []
     return Samples(
-        times,
-        bodies,
-        wind,
-        desired,
-        attitude,
-        estimate,
-        estimate_attitude,
-        std,
-        contacts,
-        forces,
-        error,
-        distances,
+        times, bodies, wind, desired, attitude, estimate, estimate_attitude, std, contacts, forces, error, distances,
         clouds,
-    )
+    )  # fmt: skip
 
 
 def _body(body: Body, times: np.ndarray, rows: np.ndarray) -> BodySamples:

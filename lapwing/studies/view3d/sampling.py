@@ -15,13 +15,6 @@ def nearest(sample_times: np.ndarray, times: np.ndarray) -> np.ndarray:
     return (np.searchsorted(sample_times, np.asarray(times) + 1e-9, side="right") - 1).clip(0, len(sample_times) - 1)
 
 
-def from_angles(angles: np.ndarray) -> np.ndarray:
-    """Return quaternions w, x, y, z, shape (k, 4), of roll, pitch, yaw [rad], shape (k, 3)."""
-    (a, b, c), (d, e, f) = np.cos(0.5 * angles.T), np.sin(0.5 * angles.T)
-    parts = (a * b * c + d * e * f, d * b * c - a * e * f, a * e * c + d * b * f, a * b * f - d * e * c)
-    return round_to_grid(np.column_stack(parts))
-
-
 def along(direction: np.ndarray) -> np.ndarray:
     """Return quaternions w, x, y, z, shape (k, 4), that rotate z to each direction; identity for vectors near zero."""
     length = np.linalg.norm(direction, axis=1)
@@ -85,10 +78,3 @@ def round_angle(angle: np.ndarray) -> np.ndarray:
 def round_to_grid(values: Any) -> np.ndarray:
     """Return values rounded to 1 / GRID."""
     return np.round(np.asarray(values, float) * GRID) / GRID
-
-
-def rotate(wxyz: np.ndarray, vectors: np.ndarray) -> np.ndarray:
-    """Return vectors, shape (3,) or (k, 3), rotated by a quaternion w, x, y, z."""
-    w, axis = wxyz[0], wxyz[1:]
-    twice = 2.0 * np.cross(axis, vectors)
-    return np.asarray(vectors + w * twice + np.cross(axis, twice))

@@ -14,7 +14,8 @@ from lapwing.services.sensors.depth_camera import pixels
 from lapwing.services.sensors.lidar import azimuths
 from lapwing.services.sensors.registry import parameters
 from lapwing.studies.flight_data import FlightData
-from lapwing.studies.view3d.sampling import nearest, rotate
+from lapwing.studies.rotation_arrays import rotate
+from lapwing.studies.view3d.sampling import nearest
 
 BUDGET = 150_000  # largest total number of points of an instrument in a recording, 6 bytes each
 MOST, FEWEST = 2500, 64  # limits of the number of points per scan
@@ -136,15 +137,8 @@ class ScanPoints:
 
     def __init__(self, scene: Any, colour: tuple[int, int, int], name: str):
         """Add the node, hidden."""
-        self._cloud = scene.add_point_cloud(
-            name,
-            np.zeros((1, 3), np.float32),
-            colour,
-            point_size=SIZE,
-            point_shape="circle",
-            point_shading="flat",
-            visible=False,
-        )
+        looks = {"point_size": SIZE, "point_shape": "circle", "point_shading": "flat", "visible": False}
+        self._cloud = scene.add_point_cloud(name, np.zeros((1, 3), np.float32), colour, **looks)
         self._time, self._shown = -np.inf, False
 
     def show(self, scans: Scans, k: int) -> None:

@@ -8,14 +8,14 @@ import numpy as np
 
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.report.style import BOUND, FLOWN
+from lapwing.studies.rotation_arrays import rotate
 from lapwing.studies.view3d.beams import Beam
-from lapwing.studies.view3d.bodies import Body, Link, Motion
-from lapwing.studies.view3d.cables import cable
+from lapwing.studies.view3d.bodies import Body, Link, Motion, cable
 from lapwing.studies.view3d.coloured_mesh import coloured_mesh
 from lapwing.studies.view3d.ghosts import Ghost
 from lapwing.studies.view3d.rotors import BLADE, SHORTEST, Rotors
 from lapwing.studies.view3d.samples import Samples
-from lapwing.studies.view3d.sampling import along, dashes, rotate
+from lapwing.studies.view3d.sampling import along, dashes
 from lapwing.studies.view3d.scans import ScanPoints
 from lapwing.studies.view3d.solids import arrow, ball, box, merge, raise_point
 from lapwing.studies.view3d.surroundings import add_solid, rgb
@@ -205,7 +205,7 @@ class Vehicle:
 
 
 def add_shaders(scene: Any) -> None:
-    """Add specks that are drawn as vehicles are: a browser compiles for seconds what it draws for the first time."""
+    """Add specks with the materials of vehicles: the first drawing of a material compiles its shaders for seconds."""
     speck = box((0.0, 0.0, 0.0), (1e-4,) * 3, BLADE)
     for k, looks in enumerate((speck, speck._replace(open=True), speck._replace(opacity=0.5))):
         add_solid(scene, f"/speck {k}", looks)

@@ -39,9 +39,7 @@ def _multirotor(flight: FlightData) -> Motion | None:
     airframe = scene.get("airframe", {})
     if "rotors" not in airframe:
         return None
-    centre = np.array(
-        airframe.get("mass", {}).get("centre", (0.0, 0.0, 0.0))
-    )  # the true position is that of the centre of mass
+    centre = np.array(airframe.get("mass", {}).get("centre", (0.0, 0.0, 0.0)))  # origin of the true position
     hubs = np.array(airframe["rotors"]["position"]) - centre
     radius = 0.5 * airframe.get("propeller", {}).get("diameter", 0.8 * float(np.linalg.norm(hubs[0])))
     solids = _hull(scene, centre) or _airframe(airframe, hubs, centre, radius)

@@ -32,7 +32,7 @@ def decay():
         SolverMethod("broken", 1, "s", steps, lambda h: lambda: None, lambda h, x: None, lambda: None),
     ]
     value = {"value": lambda t, y: y[:, 0]}
-    return Problem("decay", "s", 1.0, methods, lambda: np.array([np.exp(-1.0)]), "closed form", value)
+    return Problem("decay", 1.0, methods, lambda: np.array([np.exp(-1.0)]), "closed form", value)
 
 
 def test_measured_errors_equal_closed_form():
@@ -87,7 +87,8 @@ def test_problem_name_precedes_scene_name():
 
 
 def test_json_and_picture(tmp_path):
-    console_output.write_json(tmp_path / "a.json", "decay", decay(), points(), points()[1], [])
+    study = accuracy_command.Study("decay", decay(), points(), points()[1], [], None, None)
+    accuracy_command.write_json(tmp_path / "a.json", study)
     data = json.loads((tmp_path / "a.json").read_text())
     assert data["cheapest"]["method"] == "one"
     assert data["points"][2] == {

@@ -59,7 +59,7 @@ def test_end_of_linear_system_has_digits_of_extended_precision() -> None:
 
 def test_round_off_of_linear_system_equals_error_in_digits() -> None:
     methods = fixed_step_methods(P, START, DURATION, 8)
-    result = round_off.measure(Problem("oscillator", "s", DURATION, methods, lambda: np.zeros(2), "", {}))
+    result = round_off.measure(Problem("oscillator", DURATION, methods, lambda: np.zeros(2), ""))
     (method,) = (method for method in methods if method.name == round_off.METHOD)
     h = DURATION / result.steps
     double = method.read(h, method.prepare(h)()).samples[-1]

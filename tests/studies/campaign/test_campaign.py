@@ -216,7 +216,7 @@ def test_interval_is_computed_once_per_shard(monkeypatch):
     )
     rule, shards = StoppingRule(1e-9), {}
     for shard in range(300):
-        shards[shard ^ 1] = Count(10, 9, (("landed", 9), ("crashed", 1)))  # in pairs, in reverse order
+        shards[shard ^ 1] = Count(10, 9, {"landed": 9, "crashed": 1})  # in pairs, in reverse order
         assert not rule.reached(shards)
     assert requested == list(range(10, 3010, 10))
 
@@ -256,6 +256,7 @@ def test_report_json_and_repeated_run(complete, tmp_path, monkeypatch):
     assert (reported["runs"], len(reported["failed"]), reported["digest"]) == (RUNS, RUNS - successes, digest)
     page = page_text(folder.path / "report.html")
     assert all(text in page for text in ("Probability of success", "Sensitivities", "normal(10.4, 0.3)"))
+    assert all(f">{head}</th>" in page for head in ("max_distance [m]", "touchdown.speed [m/s]", "max_tilt [°]"))
     worst = Results(folder).worst(1)[0]["run"]
     command = f"lapwing run {SCENE} --run {worst} --campaign {folder.path}"
     assert command in page

@@ -11,7 +11,7 @@ from flight_recordings import INTERVAL, simulated, write_csv
 from lapwing.services.scene_resolver import load_one
 from lapwing.studies.identification.output_error import Fit, OutputError
 from lapwing.studies.identification.procedure import Identification, identify, start_value, write_airframe
-from lapwing.studies.identification.toml_tables import dump
+from lapwing.studies.toml_text import dump
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.start_states import NO_TRIM
 

@@ -68,21 +68,19 @@ def draw(seed: int) -> Landing:
     Every fourth landing is on bumps of 1 cm.
     """
     rng = np.random.default_rng([33, seed])
-    slope, slope_direction = math.tan(math.radians(rng.uniform(0.0, 20.0))), rng.uniform(0.0, 2.0 * math.pi)
-    slip, slip_direction = rng.uniform(0.0, 2.0), rng.uniform(0.0, 2.0 * math.pi)
-    tilt, tilt_direction = math.radians(rng.uniform(0.0, 30.0)), rng.uniform(0.0, 2.0 * math.pi)
+    slope = _random_direction(rng, math.tan(math.radians(rng.uniform(0.0, 20.0))))
+    slip = _random_direction(rng, rng.uniform(0.0, 2.0))
+    tilt = _random_direction(rng, math.radians(rng.uniform(0.0, 30.0)))
     speed, heading = float(rng.uniform(0.0, 3.0)), float(rng.uniform(0.0, 2.0 * math.pi))
     roll, pitch, yaw = map(float, rng.uniform(-1.0, 1.0, 3))
-    return Landing(
-        (slope * math.cos(slope_direction), slope * math.sin(slope_direction)),
-        0.01 if seed % 4 == 3 else 0.0,
-        speed,
-        (slip * math.cos(slip_direction), slip * math.sin(slip_direction)),
-        (tilt * math.cos(tilt_direction), tilt * math.sin(tilt_direction), 0.0),
-        heading,
-        (roll, pitch, yaw),
-        float(rng.uniform(0.0, 300.0)),
-    )
+    bump, rotor_speed = 0.01 if seed % 4 == 3 else 0.0, float(rng.uniform(0.0, 300.0))
+    return Landing(slope, bump, speed, slip, (*tilt, 0.0), heading, (roll, pitch, yaw), rotor_speed)
+
+
+def _random_direction(rng: np.random.Generator, size: float) -> tuple[float, float]:
+    """Return a horizontal vector of this length in a random direction."""
+    direction = rng.uniform(0.0, 2.0 * math.pi)
+    return size * math.cos(direction), size * math.sin(direction)
 
 
 def draw_step(seed: int) -> Landing:
@@ -130,10 +128,9 @@ def draw_toppling(seed: int) -> Landing:
 def draw_strike(seed: int) -> Landing:
     """Return a random landing tilted by 40 to 75 degrees, in which a propeller tip strikes before the feet."""
     rng = np.random.default_rng([36, seed])
-    tilt, tilt_direction = math.radians(rng.uniform(40.0, 75.0)), float(rng.uniform(0.0, 2.0 * math.pi))
+    tilt = _random_direction(rng, math.radians(rng.uniform(40.0, 75.0)))
     return draw(seed)._replace(
-        bump=0.0, speed=float(rng.uniform(0.5, 2.0)),
-        tilt=(tilt * math.cos(tilt_direction), tilt * math.sin(tilt_direction), 0.0),
+        bump=0.0, speed=float(rng.uniform(0.5, 2.0)), tilt=(*tilt, 0.0),
         slip=(float(rng.uniform(-1.0, 1.0)), float(rng.uniform(-1.0, 1.0))), tips=True,
     )  # fmt: skip
 
@@ -141,9 +138,8 @@ def draw_strike(seed: int) -> Landing:
 DRAWS: dict[str, Callable[[int], Landing]] = {
     "random": draw, "steps": draw_step, "folds": draw_fold, "toppling": draw_toppling, "strikes": draw_strike,
 }  # fmt: skip
-FASTEST = Landing(
-    (0.0, 0.0), 0.0, 3.0, (2.0, 0.0), (0.5, 0.0, 0.0), 0.0, (10.0, 10.0, 10.0), 300.0
-)  # fastest motion after bounces
+# fastest motion after bounces
+FASTEST = Landing((0.0, 0.0), 0.0, 3.0, (2.0, 0.0), (0.5, 0.0, 0.0), 0.0, (10.0, 10.0, 10.0), 300.0)
 
 
 def plant(case: Landing) -> tuple[MultirotorParameters, MultirotorState]:

@@ -38,7 +38,6 @@ def problems() -> dict[str, Problem]:
 def _problem(title: str, p: CooperativeLoadParameters, invariants: dict) -> Problem:
     return Problem(
         f"two quadrotors with a load: {title}",
-        "s",
         DURATION,
         solver_methods(p, START, DURATION, 16),
         lambda: free_motion(p, START, DURATION),

@@ -98,12 +98,10 @@ def problems() -> dict[str, Problem]:
             methods.append(_solver_method(f"{name}, {stabilisation}", p, state, volts))
     problem = Problem(
         "delivery drone of one and of five bodies, tumbling",
-        "s",
         DURATION,
         methods,
         lambda: reference(frame),
         f"SciPy DOP853 at {TOLERANCE:g} on the conserved angular momentum of five bodies, independent equations",
-        {},
     )
     return {"delivery_drone": problem}
 

@@ -20,7 +20,6 @@ def problems() -> dict[str, Problem]:
     """Return the problem of this file: a tumbling body with three different moments of inertia."""
     problem = Problem(
         "free rigid body, three different moments of inertia",
-        "s",
         DURATION,
         solver_methods(FreeBodyParameters(INERTIA), START, DURATION, 64),
         lambda: closed_form(INERTIA, START, DURATION),

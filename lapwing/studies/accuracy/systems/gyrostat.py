@@ -51,12 +51,12 @@ def problems() -> dict[str, Problem]:
 def _problem(p: GyrostatParameters, title: str, invariants: dict) -> Problem:
     return Problem(
         f"gyrostat satellite: {title}",
-        "min",
         DURATION,
         solver_methods(p, START, DURATION, 32),
         lambda: dop853(lambda t, y: right_hand_side(p, t, y), of_state(START), DURATION),
         DOP853,
         invariants,
+        unit="min",
     )
 
 

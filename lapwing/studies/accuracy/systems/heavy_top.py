@@ -52,7 +52,6 @@ def problems() -> dict[str, Problem]:
     p = HeavyTopParameters(INERTIA, (ARM, 0.0, 0.0), (0.0, 0.0, -MASS * GRAVITY))
     problem = Problem(
         "heavy top, spinning and nutating",
-        "s",
         DURATION,
         solver_methods(p, START, DURATION, 128),
         lambda: dop853(right_hand_side, of_state(START), DURATION),

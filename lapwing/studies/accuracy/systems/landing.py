@@ -38,15 +38,8 @@ def problems() -> dict[str, Problem]:
 
 
 def _problem(title: str, case: Landing) -> Problem:
-    return Problem(
-        title,
-        "s",
-        cases.DURATION,
-        [_solver_method(name, case) for name in METHODS],
-        lambda: cases.exact(case)[0][-1],
-        EVENTS,
-        {},
-    )
+    methods = [_solver_method(name, case) for name in METHODS]
+    return Problem(title, cases.DURATION, methods, lambda: cases.exact(case)[0][-1], EVENTS)
 
 
 def _solver_method(name: str, case: Landing) -> SolverMethod:

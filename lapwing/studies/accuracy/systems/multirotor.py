@@ -31,12 +31,10 @@ def problems() -> dict[str, Problem]:
     drive = bare_drive()
     problem = Problem(
         "delivery drone, bare and tumbling",
-        "s",
         DURATION,
         solver_methods(drive, START, DURATION, 16),
         lambda: dop853(lambda t, y: right_hand_side(drive, y), of_state(START), DURATION),
         DOP853,
-        {},
     )
     return {"multirotor": problem}
 

@@ -41,12 +41,10 @@ def _problem(number: int, rpm: tuple[int, ...]) -> Problem:
     start = Os4State(STILL, NO_ROTATION, STILL, STILL, speed)  # type: ignore[arg-type]
     return Problem(
         f"OS4 quadrotor: experiment {number}",
-        "s",
         DURATION,
         solver_methods(OS4, start, DURATION, 8),
         lambda: dop853(lambda t, y: right_hand_side(OS4, y), of_state(start), DURATION),
         DOP853,
-        {},
     )
 
 

@@ -38,7 +38,7 @@ def draw(flight: FlightData) -> Plot:
 
 
 def _measured(flight: FlightData) -> Plot:
-    """Plot what a battery monitor measured, of a flight without its charge."""
+    """Plot the readings of a battery monitor, for a flight without its charge."""
     view = flight.topic("battery")
     quantities = {"voltage [V]": view.voltage, "current [A]": np.abs(view.current)}
     known = {label: values for label, values in quantities.items() if np.isfinite(values).any()}

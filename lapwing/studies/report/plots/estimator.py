@@ -41,7 +41,7 @@ def draw(flight: FlightData) -> Plot:
     caption = (
         "Estimate minus truth at the time of the estimate, and three standard deviations of the estimator (shaded); "
         f"{100 * inside:.1f} % of the errors lie within them. {note}. "
-        "Attitude as rotation vector in the body frame. " + refusals(flight)
+        "Attitude as rotation vector in the body frame. " + rejections(flight)
     )
     return Plot(tuple(panels), caption, 6.6, (1.0,) * 3, (1.0,) * 3, **over(flight))
 
@@ -63,7 +63,7 @@ def errors(flight: FlightData) -> np.ndarray:
     return np.column_stack([estimated - true[rows], rotation_vector(product(conjugate(start), end))])
 
 
-def refusals(flight: FlightData) -> str:
+def rejections(flight: FlightData) -> str:
     """Return the number of rejected measurements of each source as a sentence."""
     count = Counter(source for sources in flight.estimate.rejected_sources for source in sources)
     note = ", ".join(f"{source} {number}" for source, number in count.most_common())

@@ -3,6 +3,7 @@
 import numpy as np
 
 from lapwing.studies.flight_data import FlightData
+from lapwing.studies.flight_events import BATTERY
 from lapwing.studies.report.flight_phases import over, phases, runs
 from lapwing.studies.report.plot import Panel, Plot, Stretch
 from lapwing.studies.report.style import AXIS_COLOURS, BOUND, COLOURS, FLOWN, QUIET
@@ -11,7 +12,6 @@ from lapwing.studies.saturation import highest_voltage, saturation, spans
 ORDER = 0
 TITLE = "Timeline"
 NEEDS = ("ground_truth", "status")
-BATTERY = ("", "low", "critical", "nearly empty")  # by Status.battery_warning
 MARKED = {"fault": BOUND, "contact": QUIET}  # kinds of events shown as instants
 WIDTH = 0.004  # width of an instant, relative to the time span
 

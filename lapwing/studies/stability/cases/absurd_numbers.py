@@ -119,47 +119,16 @@ def run() -> CaseResult:
     )
     why = "none: a non-finite number must not propagate"
     rows = [
-        Row(
-            "parameters",
-            "checked when the scene is read, and at every tick",
-            f"scenes without an error, of {len(parameters)}",
-            0.0,
-            why,
-            _count(parameters, "silent"),
-            baseline,
-            baseline_mass,
-        ),
-        Row(
-            "states",
-            "`check_start`",
-            f"numbers of states and parameters without an error, of {sum(states.values())}",
-            0.0,
-            why,
-            float(states["silent"]),
-            baseline,
-            baseline_states,
-        ),
-        Row(
-            "commands",
-            "the state is checked at every tick",
-            f"voltages in flight without an error, of {len(ABSURD)}",
-            0.0,
-            why,
-            _count([c for c, _ in commands], "silent"),
-            baseline,
-            baseline_voltage,
-        ),
-        Row(
-            "state_before",
-            "samples of the previous tick",
-            "of those, with a non-finite previous state",
-            0.0,
-            why,
-            _count_non_finite([largest for _, largest in commands]),
-            "a single state, overwritten",
-            baseline_voltage,
-        ),
-    ]
+        Row("parameters", "checked when the scene is read, and at every tick",
+            f"scenes without an error, of {len(parameters)}", 0.0, why, _count(parameters, "silent"), baseline,
+            baseline_mass),
+        Row("states", "`check_start`", f"numbers of states and parameters without an error, of {sum(states.values())}",
+            0.0, why, float(states["silent"]), baseline, baseline_states),
+        Row("commands", "the state is checked at every tick", f"voltages in flight without an error, of {len(ABSURD)}",
+            0.0, why, _count([c for c, _ in commands], "silent"), baseline, baseline_voltage),
+        Row("state_before", "samples of the previous tick", "of those, with a non-finite previous state", 0.0, why,
+            _count_non_finite([largest for _, largest in commands]), "a single state, overwritten", baseline_voltage),
+    ]  # fmt: skip
     kinds = ("rejected", "reported", "completed", "silent")
     x = np.arange(len(kinds), dtype=float)
     every = [("parameters", parameters), ("commands", [c for c, _ in commands])]

@@ -21,7 +21,8 @@ NO_LIFT = LiftCommand((0.0, 0.0), (ZERO, ZERO))
 LENGTH, QUAD, G = (0.6, 0.8), 0.755, 9.81
 DURATION, STEPS, SAMPLES = 10.0, 20_000, 200
 LINK = (20, 26)  # columns of the two directions, each before its angular velocity
-CASES: dict[str, tuple[float, tuple[float, float], tuple[float, float]]] = {
+Pair = tuple[float, float]  # of both links
+CASES: dict[str, tuple[float, Pair, Pair]] = {
     # load [kg], angles of the links from straight down [rad], their rates [rad/s]
     "light_load": (1e-4, (0.6, -0.5), (1.0, -1.5)),
     "heavy_load": (10.0, (0.6, -0.5), (1.0, -1.5)),
@@ -40,11 +41,36 @@ SPRING = 1e5  # [N/m] of the baseline
 def initial_state(name: str) -> tuple[Any, CooperativeLoadState]:
     """Return (parameters, initial state) of one of `CASES`, in free flight without thrust."""
     load, angles, rates = CASES[name]
-    p = CooperativeLoadParameters((QUAD, QUAD), (INERTIA, INERTIA), LENGTH, load, G, NO_LIFT)
+    return formation(load, LENGTH, angles, rates, NO_LIFT)
+
+
+def formation(
+    load: float, lengths: Pair, angles: Pair, rates: Pair, drive: LiftCommand
+) -> tuple[Any, CooperativeLoadState]:
+    """Return (parameters, state) of two level quadrotors with a load.
+
+    Args:
+        load: mass of the load [kg].
+        lengths: lengths of the links [m].
+        angles: angles of the links from straight down [rad].
+        rates: their rates [rad/s].
+        drive: thrusts and moments.
+    """
+    p = CooperativeLoadParameters((QUAD, QUAD), (INERTIA, INERTIA), lengths, load, G, drive)
     swings = tuple(
         Swing((math.sin(a), 0.0, -math.cos(a)), (0.0, -rate, 0.0)) for a, rate in zip(angles, rates, strict=True)
     )
     return p, CooperativeLoadState((0.0, 0.0, 50.0), (0.5, -0.3, 4.0), (NO_ROTATION,) * 2, (ZERO,) * 2, swings)
+
+
+def bodies(lengths: Pair, y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return positions [m] and velocities [m/s] of load and quadrotors for states `y`, shape (k, 3, 3) each."""
+    position, velocity = [y[:, :3]], [y[:, 3:6]]
+    for at, length in zip(LINK, lengths, strict=True):
+        q, omega = y[:, at : at + 3], y[:, at + 3 : at + 6]
+        position.append(y[:, :3] - length * q)
+        velocity.append(y[:, 3:6] - length * np.cross(omega, q))
+    return np.stack(position, axis=1), np.stack(velocity, axis=1)
 
 
 def adaptive(p: Any, x: Any) -> np.ndarray:
@@ -59,12 +85,9 @@ def link_and_energy_errors(name: str, method: str = "rkmk4", steps: int = STEPS)
     p, x = initial_state(name)
     y = adaptive(p, x) if method == ADAPTIVE else rows(method, p, x, DURATION, steps, SAMPLES)
     off = np.max([np.abs(np.linalg.norm(y[:, at : at + 3], axis=1) - 1.0) for at in LINK], axis=0)
-    velocity = [y[:, 3:6]] + [
-        y[:, 3:6] - length * np.cross(y[:, at + 3 : at + 6], y[:, at : at + 3])
-        for at, length in zip(LINK, LENGTH, strict=True)
-    ]
-    height = [y[:, 2]] + [y[:, 2] - length * y[:, at + 2] for at, length in zip(LINK, LENGTH, strict=True)]
-    return off, energy_drift(p.load_mass, np.array(velocity), np.array(height))
+    position, velocity = bodies(LENGTH, y)
+    velocity, height = (np.ascontiguousarray(np.swapaxes(values, 0, 1)) for values in (velocity, position[..., 2]))
+    return off, energy_drift(p.load_mass, velocity, height)
 
 
 def energy_drift(load: float, velocity: np.ndarray, height: np.ndarray) -> np.ndarray:
@@ -122,36 +145,14 @@ def run() -> CaseResult:
         light = name == "light_load"
         method = f"{ADAPTIVE} on TS^2, tolerance {TOLERANCE:g}" if light else "rkmk4 on TS^2, 0.5 ms"
         bound, why = (LIGHT_BOUND, LIGHT_WHY) if light else (ENERGY_BOUND, ENERGY_WHY)
-        (off, energy), (baseline_off, baseline_energy) = (
-            link_and_energy_errors(name, ADAPTIVE if light else "rkmk4"),
-            baseline_errors(name, STEPS // 10),
-        )
-        links, change = (
-            "error of the link length, relative",
-            "change of the energy, relative to the initial kinetic energy",
-        )
+        off, energy = link_and_energy_errors(name, ADAPTIVE if light else "rkmk4")
+        baseline_off, baseline_energy = baseline_errors(name, STEPS // 10)
         result += [
-            Row(
-                f"{name}.links",
-                method,
-                links,
-                LINK_BOUND,
-                LINK_WHY,
-                float(off.max()),
-                spring,
-                largest_finite(baseline_off),
-            ),
-            Row(
-                f"{name}.energy",
-                method,
-                change,
-                bound,
-                why,
-                float(energy.max()),
-                spring,
-                largest_finite(baseline_energy),
-            ),
-        ]
+            Row(f"{name}.links", method, "error of the link length, relative", LINK_BOUND, LINK_WHY, float(off.max()),
+                spring, largest_finite(baseline_off)),
+            Row(f"{name}.energy", method, "change of the energy, relative to the initial kinetic energy", bound, why,
+                float(energy.max()), spring, largest_finite(baseline_energy)),
+        ]  # fmt: skip
         curves += [Curve(name, t, np.maximum(energy, 1e-17)), Curve(f"{name}, springs", t, baseline_energy)]
     return CaseResult(result, Plot("time [s]", "change of the energy", curves, ENERGY_BOUND))
 

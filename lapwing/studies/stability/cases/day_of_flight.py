@@ -54,26 +54,13 @@ def run() -> CaseResult:
     memory, seconds = growth(False, HOURS)
     full_history, _ = growth(True, 2)
     rows = [
-        Row(
-            "memory",
-            "ring buffers of samples",
-            "growth of the resident memory [MB] from the first hour to the last",
-            10.0,
-            "occasional growth of Python's heap",
-            memory[-1] - memory[0],
-            "full history of the ground truth, second hour only",
-            full_history[-1] - full_history[0],
-        ),
-        Row(
-            "speed",
-            "compiled loop",
-            "processor time of the last hours over that of the first ones, fastest of three each, minus one",
-            0.05,
-            "variation of the processor time between hours",
-            min(seconds[-3:]) / min(seconds[:3]) - 1.0,
-            "an array that grows by each sample, 20 000 rows",
-            append_time_ratio(),
-        ),
-    ]
+        Row("memory", "ring buffers of samples", "growth of the resident memory [MB] from the first hour to the last",
+            10.0, "occasional growth of Python's heap", memory[-1] - memory[0],
+            "full history of the ground truth, second hour only", full_history[-1] - full_history[0]),
+        Row("speed", "compiled loop",
+            "processor time of the last hours over that of the first ones, fastest of three each, minus one", 0.05,
+            "variation of the processor time between hours", min(seconds[-3:]) / min(seconds[:3]) - 1.0,
+            "an array that grows by each sample, 20 000 rows", append_time_ratio()),
+    ]  # fmt: skip
     hours = np.arange(1.0, HOURS + 1)
     return CaseResult(rows, Plot("hour", "processor time [s]", [Curve("hover", hours, np.array(seconds))], log_y=False))

@@ -12,7 +12,7 @@ from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.ground_equilibrium import resting_pose, static_equilibrium
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 from lapwing.studies.stability.case_result import CaseResult, Curve, Row, Sweep
-from lapwing.studies.stability.cases.landing import DRONE, METHOD, STEP, G
+from lapwing.studies.stability.cases.landing import DRONE, STEP, G, run_on
 from lapwing.studies.stability.cases.slopes import DYNAMIC, energy
 
 HARD = (
@@ -35,11 +35,6 @@ def state_at_rest(terrain: Any, share: float = 0.0) -> tuple[Any, Any, tuple[flo
     return p, state._replace(motion=motion), (speed / p.layout.speed_per_volt,) * 4
 
 
-def run_on(p: Any, state: Any, voltage: tuple[float, ...], seconds: float, step: float = STEP) -> Any:
-    """Return the state after a time [s]."""
-    return multirotor.advance(METHOD, p, (0, 0), 0, state, voltage, step, round(seconds / step))
-
-
 def energy_gain(distance: float, rise: float, speed: float = SPEED, step: float = STEP) -> float:
     """Return the largest energy gain of a slide into a step, relative to its kinetic energy.
 
@@ -49,12 +44,12 @@ def energy_gain(distance: float, rise: float, speed: float = SPEED, step: float 
         speed: initial speed [m/s].
         step: integrator step [s].
     """
-    p, state, off = state_at_rest(relief(steps=[(distance, rise)]))
+    p, state, _ = state_at_rest(relief(steps=[(distance, rise)]))
     state = state._replace(motion=state.motion._replace(velocity_world=(speed, 0.0, 0.0)))
     first = energy(p, state.motion)
     highest = first
     for _ in range(100):
-        state = run_on(p, state, off, 0.01, step)
+        state = run_on(p, state, 0.01, step)
         highest = max(highest, energy(p, state.motion))
     return (highest - first) / (0.5 * p.body.mass * speed**2)
 
@@ -95,8 +90,8 @@ def acceleration_under_lift(share: float) -> float:
     down = np.array([0.0, -math.cos(ANGLE), -math.sin(ANGLE)])
     sliding = tuple(float(v) for v in 0.2 * down)
     state = state._replace(motion=state.motion._replace(velocity_world=sliding))
-    early = run_on(p, state, voltage, 0.3)
-    late = run_on(p, early, voltage, 0.2)
+    early = run_on(p, state, 0.3, voltage=voltage)
+    late = run_on(p, early, 0.2, voltage=voltage)
     return float(np.subtract(late.motion.velocity_world, early.motion.velocity_world) @ down / 0.2)
 
 

@@ -13,6 +13,7 @@ from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.accuracy.coordinates import matrices
 from lapwing.studies.flight_data import FlightData
+from lapwing.studies.rotation_arrays import from_xyzw
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 
 HARD = "a mission with a gyro bias jump, 60 s without GPS, an inverted magnetometer, or all sensors frozen"
@@ -28,6 +29,7 @@ FAULTS: dict[str, dict[str, str]] = {
     "frozen": dict.fromkeys(SENSORS, f'{{kind = "freeze", {TO_THE_END}'),
 }
 SIGMAS = 6.0
+INVARIANT = "largest error over its standard deviation, while the health is good"
 WHY = "of 3000 estimates of nine states, one beyond six standard deviations is expected in ten thousand flights"
 
 
@@ -82,7 +84,8 @@ def _outcome(flight: FlightData, min_eigenvalue: float) -> Outcome:
     estimate, truth = flight.estimate, flight.truth
     settled = estimate.times > 5.0  # after the filter has settled
     at = np.searchsorted(truth.times, estimate.times[settled]).clip(max=len(truth.times) - 1)
-    trace = np.einsum("ki,ki->k", *(_matrices(q) for q in (estimate.orientation[settled], truth.orientation[at])))
+    attitudes = estimate.orientation[settled], truth.orientation[at]
+    trace = np.einsum("ki,ki->k", *(matrices(from_xyzw(q)) for q in attitudes))
     return Outcome(
         estimate.times[settled],
         np.linalg.norm(estimate.position[settled] - truth.position[at], axis=1),
@@ -92,10 +95,6 @@ def _outcome(flight: FlightData, min_eigenvalue: float) -> Outcome:
         estimate.health_flags[settled] == 0,
         min_eigenvalue,
     )
-
-
-def _matrices(xyzw: np.ndarray) -> np.ndarray:
-    return matrices(np.roll(xyzw, 1, axis=1))
 
 
 def smallest_eigenvalue(covariance: np.ndarray) -> float:
@@ -123,39 +122,21 @@ def run() -> CaseResult:
     for name, o in outcomes.items():
         before = np.flatnonzero(o.t < START)[-1]
         claimed_ratio = np.maximum(o.position / o.position_std[before], o.angle / o.angle_std[before])
-        baseline, label = "standard deviation before the fault", float(claimed_ratio[o.t >= START].max())
+        baseline = "standard deviation before the fault", float(claimed_ratio[o.t >= START].max())
         if name == "gyro_bias":
-            baseline, label = "integration of the gyro", 0.0175 * (o.t[-1] - START) / o.angle_std[before]
+            baseline = "integration of the gyro", 0.0175 * (o.t[-1] - START) / o.angle_std[before]
         if name == "magnetometer":
-            baseline, label = "heading of the magnetometer", np.pi / o.angle_std[before]
-        invariant = "largest error over its standard deviation, while the health is good"
+            baseline = "heading of the magnetometer", np.pi / o.angle_std[before]
         rows.append(
-            Row(
-                name,
-                "error-state filter with gates and health",
-                invariant,
-                SIGMAS,
-                WHY,
-                float(o.ratio[o.healthy].max()),
-                baseline,
-                label,
-            )
-        )
+            Row(name, "error-state filter with gates and health", INVARIANT, SIGMAS, WHY,
+                float(o.ratio[o.healthy].max()), *baseline)
+        )  # fmt: skip
         curves.append(Curve(name, o.t, np.maximum(o.ratio, 1e-3)))
     min_eigenvalue = min(o.min_eigenvalue for o in outcomes.values())
-    why = "a covariance has no negative eigenvalue"
-    method = "sequential updates of a symmetric covariance"
-    invariant = "negative part of the smallest eigenvalue of the correlations"
     rows.append(
-        Row(
-            "covariance",
-            method,
-            invariant,
-            0.0,
-            why,
-            max(0.0, -min_eigenvalue),
-            "P = (1 - K H) P",
-            max(0.0, -textbook_eigenvalue()),
-        )
-    )
+        Row("covariance", "sequential updates of a symmetric covariance",
+            "negative part of the smallest eigenvalue of the correlations", 0.0,
+            "a covariance has no negative eigenvalue", max(0.0, -min_eigenvalue),
+            "P = (1 - K H) P", max(0.0, -textbook_eigenvalue()))
+    )  # fmt: skip
     return CaseResult(rows, Plot("time [s]", "error over its standard deviation", curves, SIGMAS))

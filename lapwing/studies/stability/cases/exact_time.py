@@ -21,16 +21,9 @@ def run() -> CaseResult:
     ours = np.array([abs(float(Fraction(float(t * setup.interval)) - e)) for t, e in zip(ticks, exact, strict=True)])
     summed = np.add.accumulate(np.full(ticks[-1], setup.interval))[ticks - 1]
     baseline = np.array([abs(float(Fraction(float(t)) - e)) for t, e in zip(summed, exact, strict=True)])
-    row = Row(
-        "clock",
-        "integer ticks of integer nanoseconds",
-        "error of the time [s] after 24 h",
-        1e-11,
-        "half a unit in the last place of 86 400 s as a float; time stamps are exact integers",
-        float(ours.max()),
-        "a sum of intervals",
-        float(baseline.max()),
-    )
+    row = Row("clock", "integer ticks of integer nanoseconds", "error of the time [s] after 24 h", 1e-11,
+              "half a unit in the last place of 86 400 s as a float; time stamps are exact integers", float(ours.max()),
+              "a sum of intervals", float(baseline.max()))  # fmt: skip
     hours = np.arange(1.0, HOURS + 1)
     curves = [Curve("ticks", hours, np.maximum(ours, 1e-17)), Curve("sum", hours, baseline)]
     return CaseResult([row], Plot("simulated time [h]", "error of the clock [s]", curves, row.bound))

@@ -73,15 +73,10 @@ def run() -> CaseResult:
     ratio = np.maximum(measured / linear, linear / measured)
     baseline_ratio = np.maximum(measured / baseline, baseline / measured)
     row = Row(
-        "interval",
-        "Nyquist with the delay and half a tick of hold",
-        "ratio of the longest stable intervals in flight and by analysis, worst of 6 delays",
-        FACTOR,
-        WHY,
-        float(ratio.max()),
-        "a continuous loop: every interval is stable",
-        float(baseline_ratio.max()),
-    )
+        "interval", "Nyquist with the delay and half a tick of hold",
+        "ratio of the longest stable intervals in flight and by analysis, worst of 6 delays", FACTOR, WHY,
+        float(ratio.max()), "a continuous loop: every interval is stable", float(baseline_ratio.max()),
+    )  # fmt: skip
     x = np.array(DELAYS, dtype=float)
     curves = [
         Curve("in flight", x, 1e3 * measured),

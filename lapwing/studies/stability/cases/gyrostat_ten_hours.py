@@ -59,36 +59,15 @@ def run() -> CaseResult:
     off, baseline_off = defect(ours[:, :9]), defect(baseline)
     ends = [rows("rkmk4", SPINNING, START, DURATION, STEPS, n)[-1] for n in (1, 60)]
     figures = [
-        Row(
-            "orthogonality",
-            "rkmk4, 0.01 min",
-            "R^T R - 1, largest entry",
-            ORTHOGONALITY,
-            "round-off: a few units in the last place, which must not add up over 60 000 steps",
-            worst(off),
-            "forward Euler on the matrix entries",
-            worst(baseline_off),
-        ),
-        Row(
-            "order",
-            "rkmk4",
-            "difference of the observed order from four",
-            0.2,
-            "higher-order terms after two halvings of the step",
-            abs(4.0 - order("rkmk4")),
-            "forward Euler on the coordinates",
-            abs(4.0 - order("euler")),
-        ),
-        Row(
-            "bits",
-            "time from the step count",
-            "difference of two runs with different recording intervals",
-            0.0,
-            "a chaotic run is repeatable only if all bits are identical",
-            worst(ends[0] - ends[1]),
-            "time as a sum of steps, run in ten parts",
-            worst(final_state_in_parts() - ends[0]),
-        ),
-    ]
+        Row("orthogonality", "rkmk4, 0.01 min", "R^T R - 1, largest entry", ORTHOGONALITY,
+            "round-off: a few units in the last place, which must not add up over 60 000 steps", worst(off),
+            "forward Euler on the matrix entries", worst(baseline_off)),
+        Row("order", "rkmk4", "difference of the observed order from four", 0.2,
+            "higher-order terms after two halvings of the step", abs(4.0 - order("rkmk4")),
+            "forward Euler on the coordinates", abs(4.0 - order("euler"))),
+        Row("bits", "time from the step count", "difference of two runs with different recording intervals", 0.0,
+            "a chaotic run is repeatable only if all bits are identical", worst(ends[0] - ends[1]),
+            "time as a sum of steps, run in ten parts", worst(final_state_in_parts() - ends[0])),
+    ]  # fmt: skip
     curves = [Curve("rkmk4", t, np.maximum(off, 1e-17)), Curve("Euler on entries", t, baseline_off)]
     return CaseResult(figures, Plot("time [min]", "largest entry of R^T R - 1", curves, ORTHOGONALITY))

@@ -62,38 +62,16 @@ def run() -> CaseResult:
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
     method, baseline = "rigid_splitting, 5 ms", "Lie-Euler, 5 ms"
     rows = [
-        Row(
-            "rates",
-            method,
-            "error of the body rates against Jacobi's functions [rad/s]",
-            1e-7,
+        Row("rates", method, "error of the body rates against Jacobi's functions [rad/s]", 1e-7,
             "round-off of the energy, 1e-14, times the sensitivity of the period near the separatrix, 1 / epsilon^2, "
             "times the 1000 rad of the run",
-            float(off.max()),
-            baseline,
-            float(baseline_off.max()),
-        ),
-        Row(
-            "energy",
-            method,
-            "change of the kinetic energy, relative",
-            INVARIANT_BOUND,
-            "round-off of 2e-16 in each of 200 000 steps, all of one sign",
-            float(energy.max()),
-            baseline,
-            float(baseline_energy.max()),
-        ),
-        Row(
-            "momentum",
-            method,
-            "change of the angular momentum in the world, relative",
-            INVARIANT_BOUND,
-            "as for `energy`",
-            float(momentum.max()),
-            baseline,
-            float(baseline_momentum.max()),
-        ),
-    ]
+            float(off.max()), baseline, float(baseline_off.max())),
+        Row("energy", method, "change of the kinetic energy, relative", INVARIANT_BOUND,
+            "round-off of 2e-16 in each of 200 000 steps, all of one sign", float(energy.max()), baseline,
+            float(baseline_energy.max())),
+        Row("momentum", method, "change of the angular momentum in the world, relative", INVARIANT_BOUND,
+            "as for `energy`", float(momentum.max()), baseline, float(baseline_momentum.max())),
+    ]  # fmt: skip
     curves = [Curve("rigid_splitting", t, off), Curve("Lie-Euler", t, baseline_off)]
     return CaseResult(rows, Plot("time [s]", "largest error of the rates so far [rad/s]", curves, 1e-7))
 

@@ -43,9 +43,9 @@ def state_above_slope(
     return p, state
 
 
-def run_on(p: Any, state: Any, seconds: float, step: float = STEP) -> Any:
-    """Return the state after a time [s]."""
-    return multirotor.advance(METHOD, p, (0, 0), 0, state, MOTORS_OFF, step, round(seconds / step))
+def run_on(p: Any, state: Any, seconds: float, step: float = STEP, voltage: tuple[float, ...] = MOTORS_OFF) -> Any:
+    """Return the state after a time [s] under motor voltages [V]."""
+    return multirotor.advance(METHOD, p, (0, 0), 0, state, voltage, step, round(seconds / step))
 
 
 def restitution(speed: float, phase: float, step: float, tolerance: float = multirotor.CONTACT_TOLERANCE) -> float:
@@ -189,67 +189,28 @@ def run() -> CaseResult:
     ]
 
     rows = [
-        Row(
-            "restitution",
-            "RK4 at 1 ms, the plant's step",
-            "error of the restitution, 4 speeds at 8 phases of a step",
-            1e-4,
-            "ten times the tolerance of a substep: a bounce takes twenty substeps or more",
-            errors(STEP, exact, restitution),
-            f"{euler}, 1 ms",
-            errors(STEP, exact, baseline_restitution),
-        ),
-        Row(
-            "rest_place",
-            "RK4 at 0.25, 0.5 and 1 ms",
-            "distance [m] of the rest position from that at a tolerance of 1e-10, 4 phases",
-            1e-4,
-            "ten times the tolerance of a substep, as for the restitution",
-            float(max(places)),
-            f"{euler}, 1 ms against 1/32 ms",
-            max(baseline_places),
-        ),
-        Row(
-            "rest",
-            "friction elements, RK4 at 1 ms",
-            "motion [m] in an hour of rest",
-            1e-9,
+        Row("restitution", "RK4 at 1 ms, the plant's step", "error of the restitution, 4 speeds at 8 phases of a step",
+            1e-4, "ten times the tolerance of a substep: a bounce takes twenty substeps or more",
+            errors(STEP, exact, restitution), f"{euler}, 1 ms", errors(STEP, exact, baseline_restitution)),
+        Row("rest_place", "RK4 at 0.25, 0.5 and 1 ms",
+            "distance [m] of the rest position from that at a tolerance of 1e-10, 4 phases", 1e-4,
+            "ten times the tolerance of a substep, as for the restitution", float(max(places)),
+            f"{euler}, 1 ms against 1/32 ms", max(baseline_places)),
+        Row("rest", "friction elements, RK4 at 1 ms", "motion [m] in an hour of rest", 1e-9,
             "a hundredth of the penetration caused by round-off of a position of a few metres",
-            drift_at_rest(3600.0, 0.0),
-            f"{euler}, 1 ms, in a second",
-            baseline_rest(),
-        ),
-        Row(
-            "creep",
-            "friction elements, RK4 at 1 ms",
-            "motion [m] in ten minutes on 20 degrees",
-            1e-6,
-            "a thousandth of a millimetre, below the resolution of a survey",
-            drift_at_rest(600.0, slope),
-            "regularised friction, in a second",
-            creep_distance(slope),
-        ),
-        Row(
-            "stick_slip",
-            "friction elements",
-            "speed [m/s] after the end of a slide",
-            1e-6,
-            "1 um/s: the feet stick",
-            speed,
-            "sign friction",
-            baseline_speed,
-        ),
-        Row(
-            "slide",
-            "friction elements, RK4 at 0.25, 0.5 and 1 ms",
-            "distance [m] of the end of a sliding touchdown from that at a tolerance of 1e-10",
-            1e-6,
+            drift_at_rest(3600.0, 0.0), f"{euler}, 1 ms, in a second", baseline_rest()),
+        Row("creep", "friction elements, RK4 at 1 ms", "motion [m] in ten minutes on 20 degrees", 1e-6,
+            "a thousandth of a millimetre, below the resolution of a survey", drift_at_rest(600.0, slope),
+            "regularised friction, in a second", creep_distance(slope)),
+        Row("stick_slip", "friction elements", "speed [m/s] after the end of a slide", 1e-6, "1 um/s: the feet stick",
+            speed, "sign friction", baseline_speed),
+        Row("slide", "friction elements, RK4 at 0.25, 0.5 and 1 ms",
+            "distance [m] of the end of a sliding touchdown from that at a tolerance of 1e-10", 1e-6,
             "ten times the tolerance of a substep, over a slide of centimetres in a tenth of a second",
             max(abs(slide(k * STEP) - slide(STEP, 1e-10)) for k in (0.25, 0.5, 1.0)),
             "friction state changed after each step, 1 ms against 1/32 ms",
-            abs(baseline_slide(STEP) - baseline_slide(STEP / 32.0)),
-        ),
-    ]
+            abs(baseline_slide(STEP) - baseline_slide(STEP / 32.0))),
+    ]  # fmt: skip
     return CaseResult(rows, sweep().plot())
 
 

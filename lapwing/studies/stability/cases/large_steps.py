@@ -57,27 +57,13 @@ def run() -> CaseResult:
         baseline = np.abs(1.0 - INSIDE * widest) ** 100.0
         unchecked = sum(np.isinf(np.float64(BEYOND * h) ** GROWTH_STEPS) for h in edges)
     result = [
-        Row(
-            "edge",
-            f"all {len(names)} integrators at 0.95 of their limit",
-            f"spin after {DECAY_STEPS} steps, relative",
-            1.0,
-            "inside its stability region a method damps the spin",
-            float(inside.max()),
-            f"forward Euler with 100 steps of {INSIDE * widest:.3g}, the largest of these",
-            float(baseline),
-        ),
-        Row(
-            "beyond",
-            "`simulate` at 1.3 of the limit",
-            "integrators with a non-finite state and no error",
-            0.0,
-            "every non-finite state raises an error",
-            silent_count,
-            "the same growth without a check",
-            float(unchecked),
-        ),
-    ]
+        Row("edge", f"all {len(names)} integrators at 0.95 of their limit", f"spin after {DECAY_STEPS} steps, relative",
+            1.0, "inside its stability region a method damps the spin", float(inside.max()),
+            f"forward Euler with 100 steps of {INSIDE * widest:.3g}, the largest of these", float(baseline)),
+        Row("beyond", "`simulate` at 1.3 of the limit", "integrators with a non-finite state and no error", 0.0,
+            "every non-finite state raises an error", silent_count, "the same growth without a check",
+            float(unchecked)),
+    ]  # fmt: skip
     return CaseResult(result, sweep().plot())
 
 

@@ -13,7 +13,7 @@ from lapwing.services.scene_resolver import load
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.stability import flights, jumping_clock
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
-from lapwing.studies.stability.cases.estimator import SIGMAS, Outcome, fly
+from lapwing.studies.stability.cases.estimator import INVARIANT, SIGMAS, Outcome, fly
 
 HARD = "GPS with a latency of 0.5 s, an IMU at 50 Hz, both; rates that do not divide the tick rate; jumping clocks"
 
@@ -85,46 +85,26 @@ def worst(outcome: Outcome) -> float:
 
 def run() -> CaseResult:
     """Compare errors with the estimated covariance, and count rejected readings."""
-    invariant = "largest error over its standard deviation, while the health is good"
     ours, baseline = "correction at the time of the fix", "correction at the time of arrival, entire flight"
     outcomes = {name: fly({}, extra) for name, extra in CASES}
     rows = [
-        Row(
-            name,
-            ours,
-            invariant,
-            SIGMAS,
-            WHY,
-            worst(outcomes[name]),
-            baseline,
-            float(fly({}, extra, ignore_age=True).ratio.max()),
-        )
+        Row(name, ours, INVARIANT, SIGMAS, WHY, worst(outcomes[name]), baseline,
+            float(fly({}, extra, ignore_age=True).ratio.max()))
         for name, extra in CASES
-    ]
+    ]  # fmt: skip
     rows.append(
-        Row(
-            "odd_rates",
-            "rejection with the key and the possible rates",
-            f"accepted rates that do not divide the tick rate, of {len(INDIVISIBLE_RATES)}",
-            0.0,
+        Row("odd_rates", "rejection with the key and the possible rates",
+            f"accepted rates that do not divide the tick rate, of {len(INDIVISIBLE_RATES)}", 0.0,
             "none: messages are due at integer ticks",
             float(sum(not is_rejected(override) for override in INDIVISIBLE_RATES)),
-            "schedule by floating-point modulo, one hour",
-            float(modulo_errors(25, 900_000)),
-        )
-    )
+            "schedule by floating-point modulo, one hour", float(modulo_errors(25, 900_000)))
+    )  # fmt: skip
     rows.append(
-        Row(
-            "jumping_clock",
-            "lock step: time from the tick count",
+        Row("jumping_clock", "lock step: time from the tick count",
             "commands that differ from a single-process flight; the autopilot's clocks jump 2 to 20 times per second",
-            0.0,
-            "none: the flight does not depend on process clocks",
-            float(differing_commands()),
-            "intervals from the wall clock",
-            float(wall_clock_errors(1000, 0.004)),
-        )
-    )
+            0.0, "none: the flight does not depend on process clocks", float(differing_commands()),
+            "intervals from the wall clock", float(wall_clock_errors(1000, 0.004)))
+    )  # fmt: skip
     curves = [Curve(name, o.t, np.maximum(o.ratio, 1e-3)) for name, o in outcomes.items()]
     return CaseResult(rows, Plot("time [s]", "error over its standard deviation", curves, SIGMAS))
 
@@ -139,5 +119,4 @@ def sweep() -> Sweep:
         Curve("correction at the time of the fix", 0.1 * late, ours),
         Curve("correction at the time of arrival, entire flight", 0.1 * late, baseline),
     ]
-    invariant = "largest error over its standard deviation, while the health is good"
-    return Sweep("latency of the fixes [s]", invariant, SIGMAS, curves, log_x=False)
+    return Sweep("latency of the fixes [s]", INVARIANT, SIGMAS, curves, log_x=False)

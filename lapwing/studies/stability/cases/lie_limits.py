@@ -80,37 +80,13 @@ def run() -> CaseResult:
     small, at_pole, at_pi = ratio_errors(gaps), ratio_errors(2.0 * math.pi - gaps), log_errors(gaps)
     invariant = "error of the third coefficient of the inverse of dexp, relative"
     rows = [
-        Row(
-            "dexpinv_at_zero",
-            "series below 1 rad",
-            invariant,
-            BOUND,
-            WHY,
-            float(small[0].max()),
-            "(1 - (a/2) cot(a/2)) / a^2",
-            float(small[1].max()),
-        ),
-        Row(
-            "dexpinv_at_2_pi",
-            "vector length in double-double precision",
-            invariant,
-            BOUND,
-            WHY,
-            float(at_pole[0].max()),
-            "(1 - (a/2) cot(a/2)) / a^2",
-            float(at_pole[1].max()),
-        ),
-        Row(
-            "log_at_pi",
-            "from the largest component of the quaternion",
-            "error of the rotation vector [rad]",
-            BOUND,
-            WHY,
-            float(at_pi[0].max()),
-            "arc cosine of the trace, skew part",
-            float(at_pi[1].max()),
-        ),
-    ]
+        Row("dexpinv_at_zero", "series below 1 rad", invariant, BOUND, WHY, float(small[0].max()),
+            "(1 - (a/2) cot(a/2)) / a^2", float(small[1].max())),
+        Row("dexpinv_at_2_pi", "vector length in double-double precision", invariant, BOUND, WHY,
+            float(at_pole[0].max()), "(1 - (a/2) cot(a/2)) / a^2", float(at_pole[1].max())),
+        Row("log_at_pi", "from the largest component of the quaternion", "error of the rotation vector [rad]", BOUND,
+            WHY, float(at_pi[0].max()), "arc cosine of the trace, skew part", float(at_pi[1].max())),
+    ]  # fmt: skip
     curves = [
         Curve(f"{name}{where}", gaps, np.maximum(values, 1e-17))
         for where, both in ((" at 0", small), (" at 2 pi", at_pole), (" log at pi", at_pi))

@@ -1,20 +1,17 @@
 """Case 10, limits: release of a load, and links under compression where cables would be slack."""
 
 import math
-from typing import Any
 
 import numpy as np
 from scipy.integrate import quad
 
-from lapwing.dynamics.lie.quaternion import NO_ROTATION
-from lapwing.dynamics.lie.ts2 import Swing
 from lapwing.dynamics.vector import ZERO
-from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters, CooperativeLoadState, LiftCommand
+from lapwing.dynamics.vehicles.cooperative_load import LiftCommand
 from lapwing.dynamics.vehicles.released_load import release
 from lapwing.kernels.state_tree import unflatten
 from lapwing.messages.topics import BODIES, LIFT, TRUTH
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
-from lapwing.studies.stability.cases.cooperative_load import INERTIA, LENGTH, QUAD, G
+from lapwing.studies.stability.cases.cooperative_load import LENGTH, QUAD, G, bodies, formation
 from lapwing.studies.stability.flights import fly
 from lapwing.studies.stability.sampled_runs import rows
 from lapwing.studies.tension import pushes, tension
@@ -22,30 +19,11 @@ from lapwing.studies.tension import pushes, tension
 HARD = "release of a swinging load; links under compression near the top, where cables would be slack"
 
 LOAD, THRUST = 0.4, 12.0  # [kg], [N] of one quadrotor
+LIFT_COMMAND = LiftCommand((THRUST, THRUST), (ZERO, ZERO))
 STEP, SWING, FALL = 2.5e-3, 1.0, 2.0  # [s]
 KAPPA, LINK = 3.5, 0.7  # squared rate at the bottom over U / (M L), slack for 2 < kappa < 5; [m] length of both links
 PUSHING = "formation.path=[[-2.5,0.0,0.75],[1.0,0.0,5.0],[0.0,0.0,-6.0]]"  # descends faster than free fall
 RELEASE_BOUND, FALL_BOUND, TIME_BOUND, FORCE_BOUND = 1e-13, 1e-11, 1e-5, 1e-10
-
-
-def formation(lengths: tuple[float, float], angles: tuple[float, float], rates: tuple[float, float]) -> tuple[Any, Any]:
-    """Return (parameters, state) of two level quadrotors at constant thrust; link angles from straight down."""
-    drive = LiftCommand((THRUST, THRUST), (ZERO, ZERO))
-    p = CooperativeLoadParameters((QUAD, QUAD), (INERTIA, INERTIA), lengths, LOAD, G, drive)
-    swings = tuple(
-        Swing((math.sin(a), 0.0, -math.cos(a)), (0.0, -rate, 0.0)) for a, rate in zip(angles, rates, strict=True)
-    )
-    return p, CooperativeLoadState((0.0, 0.0, 50.0), (0.5, -0.3, 4.0), (NO_ROTATION,) * 2, (ZERO,) * 2, swings)
-
-
-def bodies(lengths: tuple[float, float], y: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return positions [m] and velocities [m/s] of load and quadrotors for states `y`, shape (k, 3, 3) each."""
-    position, velocity = [y[:, :3]], [y[:, 3:6]]
-    for at, length in zip((20, 26), lengths, strict=True):
-        q, omega = y[:, at : at + 3], y[:, at + 3 : at + 6]
-        position.append(y[:, :3] - length * q)
-        velocity.append(y[:, 3:6] - length * np.cross(omega, q))
-    return np.stack(position, axis=1), np.stack(velocity, axis=1)
 
 
 def conserved_quantities(position: np.ndarray, velocity: np.ndarray) -> np.ndarray:
@@ -60,14 +38,12 @@ def release_errors() -> tuple[float, float, float, float]:
 
     Each for Lapwing's method and for the baseline: (change, baseline change, distance, baseline distance).
     """
-    p, x = formation(LENGTH, (0.6, -0.5), (5.0, -4.0))
+    p, x = formation(LOAD, LENGTH, (0.6, -0.5), (5.0, -4.0), LIFT_COMMAND)
     steps = round(SWING / STEP) * 5
     y = rows("rkmk4", p, x, SWING, steps, steps // 5)
     position, velocity = bodies(LENGTH, y)
-    before, size = (
-        conserved_quantities(position[-1], velocity[-1]),
-        np.abs(conserved_quantities(position[-1], np.abs(velocity[-1]))),
-    )
+    before = conserved_quantities(position[-1], velocity[-1])
+    size = np.abs(conserved_quantities(position[-1], np.abs(velocity[-1])))
     free, state = release(p, unflatten(x, tuple(map(float, y[-1]))))
     r = np.array([state.load_position, *state.quad_position])
     v = np.array([state.load_velocity, *state.quad_velocity])
@@ -93,7 +69,7 @@ def release_errors() -> tuple[float, float, float, float]:
 def over_the_top() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return (times [s], tension of both links [N], tension in closed form [N], angle [rad]), shape (k,) each."""
     rate = math.sqrt(KAPPA * THRUST / (QUAD * LINK))
-    p, x = formation((LINK, LINK), (0.0, 0.0), (rate, rate))
+    p, x = formation(LOAD, (LINK, LINK), (0.0, 0.0), (rate, rate), LIFT_COMMAND)
     duration = 0.5
     samples = round(duration / STEP)
     y = rows("rkmk4", p, x, duration, 5 * samples, samples)
@@ -118,11 +94,8 @@ def unreported() -> tuple[float, float]:
     """Return 1 if the event, and 1 if the link length, does not show a compressed link of a flight; else 0."""
     flight = fly("cooperative_load", [PUSHING], (TRUTH, BODIES, LIFT))
     reported = any(event.kind == "slack" for event in flight.events)
-    place, length = (
-        flight.topic("body_states").position,
-        np.array(flight.origin.scene["cooperative_load"]["link_length"]),
-    )
-    off = np.abs(np.linalg.norm(place[:, :1] - place[:, 1:], axis=2) / length - 1.0).max()
+    place, length = flight.topic("body_states").position, flight.origin.scene["cooperative_load"]["link_length"]
+    off = np.abs(np.linalg.norm(place[:, :1] - place[:, 1:], axis=2) / np.array(length) - 1.0).max()
     return float(not reported), float(off < 1e-9)
 
 

@@ -72,16 +72,8 @@ def run() -> CaseResult:
     )
     baseline = drift(momentum(euler_angles(OFFSET, STEPS // 4, SAMPLES)))
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
-    row = Row(
-        "momentum",
-        "rkmk4 on SO(3), 1 ms",
-        "change of the angular momentum in the world, relative",
-        BOUND,
-        WHY,
-        float(ours.max()),
-        "RK4 on Euler angles, 4 ms",
-        float(baseline.max()),
-    )
+    row = Row("momentum", "rkmk4 on SO(3), 1 ms", "change of the angular momentum in the world, relative", BOUND, WHY,
+              float(ours.max()), "RK4 on Euler angles, 4 ms", float(baseline.max()))  # fmt: skip
     return CaseResult(
         [row],
         Plot("time [s]", "change of momentum", [Curve("rkmk4", t, ours), Curve("Euler angles", t, baseline)], BOUND),

@@ -45,27 +45,14 @@ def run() -> CaseResult:
     with np.errstate(divide="ignore", invalid="ignore"):
         undefined = np.float64(1.0) / np.float64(0.0) * np.float64(0.0)  # infinite rate times a difference of zero
     rows = [
-        Row(
-            "stiff",
-            "steps split down to the time constant",
-            "deviation of the rotor speed from its stationary value at every tick, relative",
-            BOUND,
-            "a tick lasts 400 time constants: round-off and the error of the last step remain",
-            float(deviation.max()),
-            "RK4 at 1 ms, one tick",
-            float(baseline[-1]),
-        ),
-        Row(
-            "zero",
-            "rejection of a time constant below 1 us with key, value and limit",
-            "accepted scenes without lag",
-            0.0,
-            "none: an infinite rate times a difference of zero is NaN",
-            is_accepted(0.0) + is_accepted(1e-9),
-            "difference over the time constant: NaN",
-            float(np.isnan(undefined)),
-        ),
-    ]
+        Row("stiff", "steps split down to the time constant",
+            "deviation of the rotor speed from its stationary value at every tick, relative", BOUND,
+            "a tick lasts 400 time constants: round-off and the error of the last step remain", float(deviation.max()),
+            "RK4 at 1 ms, one tick", float(baseline[-1])),
+        Row("zero", "rejection of a time constant below 1 us with key, value and limit", "accepted scenes without lag",
+            0.0, "none: an infinite rate times a difference of zero is NaN", is_accepted(0.0) + is_accepted(1e-9),
+            "difference over the time constant: NaN", float(np.isnan(undefined))),
+    ]  # fmt: skip
     curves = [Curve("split", t, np.maximum(deviation, 1e-17)), Curve("RK4 at 1 ms", STEP * np.arange(1, 5), baseline)]
     return CaseResult(rows, Plot("time [s]", "deviation of the rotor speed, relative", curves, BOUND))
 

@@ -60,31 +60,16 @@ def run() -> CaseResult:
     for body in BODIES:
         ours, baseline = drifts(METHOD, body, STEPS), drifts(BASELINE, body, STEPS)
         rows.append(
-            Row(
-                body,
-                f"{METHOD}, 1 ms",
-                "change of energy and momentum, relative",
-                BOUND,
-                WHY,
-                float(ours.max()),
-                "RK4 on the components of the quaternion",
-                float(baseline.max()),
-            )
-        )
+            Row(body, f"{METHOD}, 1 ms", "change of energy and momentum, relative", BOUND, WHY, float(ours.max()),
+                "RK4 on the components of the quaternion", float(baseline.max()))
+        )  # fmt: skip
         curves += [Curve(f"{body}", t, ours), Curve(f"{body}, baseline", t, baseline)]
     off, baseline_off = nearly_spherical()
     rows.append(
-        Row(
-            "nearly_spherical",
-            f"{METHOD}, 1 ms",
-            "error of the body rates [rad/s]",
-            1e-10,
-            "as for `needle`, for 5 rad/s",
-            off,
-            "Jacobi's functions in textbook form, with cancellation of the moments",
-            baseline_off,
-        )
-    )
+        Row("nearly_spherical", f"{METHOD}, 1 ms", "error of the body rates [rad/s]", 1e-10,
+            "as for `needle`, for 5 rad/s", off,
+            "Jacobi's functions in textbook form, with cancellation of the moments", baseline_off)
+    )  # fmt: skip
     return CaseResult(rows, Plot("time [s]", "change of energy and momentum", curves, BOUND))
 
 

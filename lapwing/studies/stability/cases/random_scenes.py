@@ -63,27 +63,13 @@ def run() -> CaseResult:
     baseline_different = [generator.normal(size=3).tobytes() != generator.normal(size=3).tobytes() for _ in pairs]
     unsplit = [1.0 / float(lag) * float(step) > 2.0 for lag, step in map(_lag_and_step, range(COUNT))]
     rows = [
-        Row(
-            "finite",
-            "validation; steps split for motor lag and ground",
-            f"valid scenes with a non-finite state within 1 s, of {len(pairs)}",
-            0.0,
-            WHY,
-            float(sum(diverged)),
-            "forward Euler on the motor lag, without substeps",
-            float(sum(unsplit)),
-        ),
-        Row(
-            "digest",
-            "counter-based random numbers",
-            f"scenes that differ when repeated, of {len(pairs)}",
-            0.0,
-            "none: equal scene and seed give identical bits",
-            float(sum(different)),
-            "a single generator with a state",
-            float(sum(baseline_different)),
-        ),
-    ]
+        Row("finite", "validation; steps split for motor lag and ground",
+            f"valid scenes with a non-finite state within 1 s, of {len(pairs)}", 0.0, WHY, float(sum(diverged)),
+            "forward Euler on the motor lag, without substeps", float(sum(unsplit))),
+        Row("digest", "counter-based random numbers", f"scenes that differ when repeated, of {len(pairs)}", 0.0,
+            "none: equal scene and seed give identical bits", float(sum(different)), "a single generator with a state",
+            float(sum(baseline_different))),
+    ]  # fmt: skip
     turn_rate = [float(np.abs(first.truth.angular_velocity).max()) for first, _ in pairs]
     x = np.arange(len(pairs), dtype=float)
     return CaseResult(

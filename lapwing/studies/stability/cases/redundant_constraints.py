@@ -127,47 +127,17 @@ def run() -> CaseResult:
     t, off, baseline_off = singular_position()
     ours_off, baseline_rank_error = bricard_errors(1e-6)
     figures = [
-        Row(
-            "rank_24_of_32",
-            "rank-revealing QR",
-            "J a - gamma, relative",
-            1e-10,
+        Row("rank_24_of_32", "rank-revealing QR", "J a - gamma, relative", 1e-10,
             "1e-16 times the condition number of the constraints, at propeller speeds of 400 rad/s",
-            redundancy_errors()[0],
-            "LU of the saddle-point matrix, singular",
-            redundancy_errors()[1],
-        ),
-        Row(
-            "bricard",
-            "initial rank as a bound",
-            "error of the accelerations 1e-6 m off the constraints, relative",
-            1e-3,
-            "a thousand times the joint defect",
-            ours_off,
-            "newly determined rank",
-            baseline_rank_error,
-        ),
-        Row(
-            "four_bar",
-            "RK4 with projection, 2 ms",
-            "error of a crank's tip in 5 s [m]",
-            POSITION,
-            "a thousandth of the tolerance of the benchmark, 1e-3 (IFToMM A02)",
-            float(off.max()),
-            "RK4 without stabilisation, 2 ms",
-            float(np.nanmax(baseline_off)),
-        ),
-        Row(
-            "start",
-            "correction in the mass metric",
-            "largest defect of an initial state with errors of 2 cm",
-            1e-12,
-            "round-off of coordinates of a few metres",
-            start_defects()[0],
-            "no correction",
-            start_defects()[1],
-        ),
-    ]
+            redundancy_errors()[0], "LU of the saddle-point matrix, singular", redundancy_errors()[1]),
+        Row("bricard", "initial rank as a bound", "error of the accelerations 1e-6 m off the constraints, relative",
+            1e-3, "a thousand times the joint defect", ours_off, "newly determined rank", baseline_rank_error),
+        Row("four_bar", "RK4 with projection, 2 ms", "error of a crank's tip in 5 s [m]", POSITION,
+            "a thousandth of the tolerance of the benchmark, 1e-3 (IFToMM A02)", float(off.max()),
+            "RK4 without stabilisation, 2 ms", float(np.nanmax(baseline_off))),
+        Row("start", "correction in the mass metric", "largest defect of an initial state with errors of 2 cm", 1e-12,
+            "round-off of coordinates of a few metres", start_defects()[0], "no correction", start_defects()[1]),
+    ]  # fmt: skip
     curves = [Curve("projection", t, off), Curve("no stabilisation", t, baseline_off)]
     return CaseResult(figures, Plot("time [s]", "error of the crank's tip [m]", curves, POSITION))
 

@@ -92,47 +92,21 @@ def run() -> CaseResult:
     _, baseline = height(False, LOSS_DURATION)
     norm, baseline_norm = norm_errors_in_tumble()
     rows = [
-        Row(
-            "thrust_loss",
-            "integral held during saturation",
-            "overshoot [m] after 0.5 s without thrust",
-            OVERSHOOT,
-            "below the fall of 2.5 m, as without integrator windup",
-            float(ours.max()),
-            "integral without anti-windup",
-            float(baseline.max()),
-        ),
-        Row(
-            "gust",
-            "tuned gains, integral held",
-            "height [m] over the path after a downward gust of 25 m/s for 3 s, motors saturated",
-            REBOUND,
-            "a fifth of the deflection of 0.5 m",
-            rebound("tuned"),
-            "gains of the paper, without feed-forward",
-            rebound("paper"),
-        ),
-        Row(
-            "payload_drop",
-            "tuned gains, integral held",
-            "largest distance [m] from the path after the release of 2 kg in wind of 25 m/s",
-            DISTANCE,
-            "half the distance between opposite rotors",
-            drop_distance("tuned"),
-            "gains of the paper, without feed-forward",
-            drop_distance("paper"),
-        ),
-        Row(
-            "motor_out",
-            "attitude on SO(3)",
-            "norm of the quaternion minus one, with a failed motor in hover",
-            NORM,
-            "round-off, which must not accumulate during the tumble",
-            norm,
-            "forward Euler on the components",
-            baseline_norm,
-        ),
-    ]
+        Row("thrust_loss", "integral held during saturation", "overshoot [m] after 0.5 s without thrust", OVERSHOOT,
+            "below the fall of 2.5 m, as without integrator windup", float(ours.max()), "integral without anti-windup",
+            float(baseline.max())),
+        Row("gust", "tuned gains, integral held",
+            "height [m] over the path after a downward gust of 25 m/s for 3 s, motors saturated", REBOUND,
+            "a fifth of the deflection of 0.5 m", rebound("tuned"), "gains of the paper, without feed-forward",
+            rebound("paper")),
+        Row("payload_drop", "tuned gains, integral held",
+            "largest distance [m] from the path after the release of 2 kg in wind of 25 m/s", DISTANCE,
+            "half the distance between opposite rotors", drop_distance("tuned"),
+            "gains of the paper, without feed-forward", drop_distance("paper")),
+        Row("motor_out", "attitude on SO(3)", "norm of the quaternion minus one, with a failed motor in hover", NORM,
+            "round-off, which must not accumulate during the tumble", norm, "forward Euler on the components",
+            baseline_norm),
+    ]  # fmt: skip
     curves = [Curve("integral held", t, ours), Curve("no anti-windup", t, baseline)]
     return CaseResult(rows, Plot("time [s]", "height over the setpoint [m]", curves, OVERSHOOT, log_y=False))
 

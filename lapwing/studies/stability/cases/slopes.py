@@ -84,32 +84,19 @@ def run() -> CaseResult:
     one_coefficient = G * (math.sin(a) - STATIC * math.cos(a))
     sign, anchored = "sign friction", "friction elements, RK4 at 1 ms"
     gain = max(baseline_restitution(1.0, phase / 8, STEP) for phase in range(8)) ** 2 - 1.0
-    no_slip, transient = (
-        "a thousandth of a millimetre: the feet stick",
-        "remaining oscillation of the feet's springs after 0.3 s",
-    )
-    steep, gained = f"motion [m] in a minute at {below:.1f} degrees", "energy gain of a touchdown on one foot, relative"
-    against, on_bumps = (
-        "error of the acceleration on 30 degrees, relative to g (sin - mu cos)",
-        "motion [m] in a minute on bumps of 2 cm",
-    )
+    no_slip = "a thousandth of a millimetre: the feet stick"
     off, baseline_off = abs(slide_acceleration(beyond) / exact - 1.0), abs(one_coefficient / exact - 1.0)
-    none, euler = "round-off: the ground adds no energy", "forward Euler on spring and damper, upright"
     rows = [
-        Row("below", anchored, steep, REST, no_slip, distance(below), sign, chatter_distance(below)),
-        Row(
-            "beyond",
-            anchored,
-            against,
-            SLIDE,
-            transient,
-            off,
-            "one coefficient for static and dynamic friction",
-            baseline_off,
-        ),
-        Row("one_foot", anchored, gained, 1e-9, none, one_foot(), euler, gain),
-        Row("bumps", anchored, on_bumps, REST, no_slip, bumps(), sign, chatter_distance(5.0)),
-    ]
+        Row("below", anchored, f"motion [m] in a minute at {below:.1f} degrees", REST, no_slip,
+            distance(below), sign, chatter_distance(below)),
+        Row("beyond", anchored, "error of the acceleration on 30 degrees, relative to g (sin - mu cos)", SLIDE,
+            "remaining oscillation of the feet's springs after 0.3 s", off,
+            "one coefficient for static and dynamic friction", baseline_off),
+        Row("one_foot", anchored, "energy gain of a touchdown on one foot, relative", 1e-9,
+            "round-off: the ground adds no energy", one_foot(), "forward Euler on spring and damper, upright", gain),
+        Row("bumps", anchored, "motion [m] in a minute on bumps of 2 cm", REST, no_slip,
+            bumps(), sign, chatter_distance(5.0)),
+    ]  # fmt: skip
     return CaseResult(rows, sweep().plot())
 
 

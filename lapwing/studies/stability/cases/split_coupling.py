@@ -1,5 +1,6 @@
 """Case 21: a carried load with its stiff control in a separate process."""
 
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -21,7 +22,7 @@ LOW_RATE = 20  # [Hz]
 
 @cache
 def single_process(steps: int) -> np.ndarray:
-    """Return the load's positions [m] with the control inside the plant's equations, shape (LOOKS + 1, 3)."""
+    """Return the load's positions [m] with the control inside the plant's equations, shape (SAMPLES + 1, 3)."""
     services = resolve(load("cooperative_load", [])).services
     law: Any = services["formation"].parameters
     start: Any = services["plant"].parameters.start
@@ -67,31 +68,16 @@ def run() -> CaseResult:
     """Compare one process with two."""
     one = float(np.linalg.norm(single_process(1000) - single_process(2000), axis=1).max())
     why = "the formation flies at 5 m/s, 12 mm per communication step of 2.5 ms"
-    baseline_distance, baseline = (
-        distance_from_single(two_processes(LOW_RATE, "jacobi")),
-        "two processes with Jacobi coupling at 20 Hz",
-    )
+    baseline = "two processes with Jacobi coupling at 20 Hz", distance_from_single(two_processes(LOW_RATE, "jacobi"))
     invariant, processes = "distance of the load [m] from the single-process run", "two processes at 400 Hz"
-    gauss_seidel, jacobi = (
-        distance_from_single(two_processes(400, "gauss_seidel")),
-        distance_from_single(two_processes(400, "jacobi")),
-    )
-    method = "control in the plant's equations, 5 ms"
-    cost = "a hundredth of the error of the coupling"
     figures = [
-        Row("sequential", processes, invariant, BOUND, why, gauss_seidel, baseline, baseline_distance),
-        Row("parallel", processes, invariant, BOUND, why, jacobi, baseline, baseline_distance),
-        Row(
-            "one",
-            method,
-            "distance of the load [m] from the run at 2.5 ms",
-            1e-4,
-            cost,
-            one,
-            baseline,
-            baseline_distance,
-        ),
+        Row(name, processes, invariant, BOUND, why, distance_from_single(two_processes(400, coupling)), *baseline)
+        for name, coupling in (("sequential", "gauss_seidel"), ("parallel", "jacobi"))
     ]
+    figures.append(
+        Row("one", "control in the plant's equations, 5 ms", "distance of the load [m] from the run at 2.5 ms", 1e-4,
+            "a hundredth of the error of the coupling", one, *baseline)
+    )  # fmt: skip
     t = np.linspace(0.0, DURATION, SAMPLES + 1)
     curves = [
         Curve(f"{coupling}, {rate} Hz", t, np.linalg.norm(two_processes(rate, coupling) - single_process(2000), axis=1))
@@ -104,23 +90,15 @@ def run() -> CaseResult:
 def sweep() -> Sweep:
     """Decrease the communication rate."""
     intervals = 1.0 / np.array(RATES)
+
+    def curve(name: str, positions: Callable[[int], np.ndarray], lowest: float = 0.0) -> Curve:
+        """Return the distance of the runs at all `RATES`; NaN below the `lowest` [Hz]."""
+        distances = [distance_from_single(positions(rate)) if rate >= lowest else np.nan for rate in RATES]
+        return Curve(name, intervals, np.array(distances))
+
     curves = [
-        Curve(
-            f"two processes, {coupling}",
-            intervals,
-            np.array([distance_from_single(two_processes(rate, coupling)) for rate in RATES]),
-        )
-        for coupling in ("gauss_seidel", "jacobi")
+        curve("two processes, gauss_seidel", lambda rate: two_processes(rate, "gauss_seidel")),
+        curve("two processes, jacobi", lambda rate: two_processes(rate, "jacobi")),
+        curve("one process", lambda rate: single_process(round(DURATION * rate)), SAMPLES / DURATION),
     ]
-    one = np.array(
-        [
-            distance_from_single(single_process(round(DURATION * rate))) if rate >= SAMPLES / DURATION else np.nan
-            for rate in RATES
-        ]
-    )
-    return Sweep(
-        "communication step, or integrator step [s]",
-        "distance [m]",
-        1.0,
-        [*curves, Curve("one process", intervals, one)],
-    )
+    return Sweep("communication step, or integrator step [s]", "distance [m]", 1.0, curves)

@@ -42,16 +42,10 @@ def baseline_error(step: float) -> float:
 
 def run() -> CaseResult:
     """Compare the final positions at several steps."""
-    row = Row(
-        "end",
-        "RK4 with error control, steps of at most 0.25 to 2 ms",
-        "distance [m] of the final position from that at an accuracy of 1e-8, worst of 4 steps",
-        BOUND,
-        "the tolerance of a substep",
-        max(end_error(step) for step in STEPS),
-        "RK4 at 0.5 ms without error control",
-        baseline_error(BASELINE),
-    )
+    row = Row("end", "RK4 with error control, steps of at most 0.25 to 2 ms",
+              "distance [m] of the final position from that at an accuracy of 1e-8, worst of 4 steps", BOUND,
+              "the tolerance of a substep", max(end_error(step) for step in STEPS),
+              "RK4 at 0.5 ms without error control", baseline_error(BASELINE))  # fmt: skip
     return CaseResult([row], sweep().plot())
 
 
