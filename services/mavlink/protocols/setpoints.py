@@ -14,7 +14,7 @@ from lapwing.services.common.mavlink.geo_coordinates import (
     from_world,
     to_world,
 )
-from lapwing.services.mavlink.protocols.handler import handles
+from lapwing.services.mavlink.protocols import handles
 from lapwing.services.mavlink.session import Session
 
 _AHEAD = {mavlink.MAV_FRAME_BODY_OFFSET_NED, mavlink.MAV_FRAME_BODY_FRD}  # positions from the vehicle, along its axes
