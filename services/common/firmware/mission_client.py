@@ -5,12 +5,12 @@ speed of the run. Source: MAVLink guide, "Mission Protocol", "Parameter Protocol
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import Enum, auto
-from typing import Any
+from typing import Any, NamedTuple
 
-from lapwing.services.common.firmware.conventions import Conventions
 from lapwing.services.common.firmware.frame_filter import FrameFilter
+from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput
 from lapwing.services.common.firmware.mavlink_transport import Transport
 from lapwing.services.common.firmware.mission_messages import item_message, result_name
 from lapwing.services.common.firmware.parameter_client import ParameterClient
@@ -39,6 +39,17 @@ NEEDED = (  # messages with a handler
     mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
     EVENT,
 )
+
+
+class Conventions(NamedTuple):
+    """Differences between firmwares on their MAVLink links."""
+
+    mission_mode: tuple[float, float]  # parameters 2 and 3 of MAV_CMD_DO_SET_MODE
+    home_first: bool  # item 0 of a mission is the home position
+    open_value: float  # replaces NaN in the parameters of an item
+    bytewise: bool  # integer parameters keep their bytes in the float field
+    mode_name: Callable[[int], str]  # of a heartbeat's custom_mode
+    event_text: Callable[[int, bytes], str] = lambda number, arguments: ""  # of a failsafe's EVENT, "" for others
 
 
 class Stage(Enum):
@@ -267,3 +278,19 @@ class MissionClient:
     def _on_statustext(self, message: Any) -> None:
         text = message.text.rstrip("\0").strip()  # PX4 ends texts that it also sends as events with a tab
         self.texts.add(text, message.severity, self.armed, self.stage is Stage.ARMING)
+
+
+def poll_flight(firmware: str, client: MissionClient, time: float) -> FirmwareOutput:
+    """Poll the client at simulation `time` [s]. Return the state of the flight, without outputs.
+
+    Raises:
+        FirmwareError: the firmware rejects the mission.
+    """
+    client.poll(time)
+    if client.error:
+        raise FirmwareError(f"{firmware}: {client.error} at t = {time:.3f} s; change the mission")
+    failsafe = client.texts.failsafe if client.armed else ""
+    finished = client.stage is Stage.FINISHED
+    return FirmwareOutput(
+        (), client.armed, client.landed, finished, client.mode, failsafe, tuple(client.texts.blockers)
+    )
