@@ -35,7 +35,7 @@ class Command(NamedTuple):
 
     motor_voltage: PerRotor  # [V]
     thrust: PerRotor  # [N]
-    roll_reference: float  # of the inner loop [rad]
+    roll_reference: float  # [rad] reference of the inner loop
     pitch_reference: float  # [rad]
     yaw_reference: float  # [rad]
     finished: bool  # landed, motors off
@@ -50,7 +50,7 @@ class Parameters(NamedTuple):
     pitch_inner: Pid  # [N] over [rad]
     roll_outer: Pid  # [rad] of tilt over [m]
     pitch_outer: Pid  # [rad] over [m]
-    smoothing: Smoothing  # of the tilt references
+    smoothing: Smoothing  # filter of the tilt references
     tilt_limit: float  # [rad] about either axis
     hover_collective: float  # [N] feed-forward of every rotor; 0 without feed-forward
     gravity: float  # [m/s^2]
@@ -67,8 +67,8 @@ class State(NamedTuple):
     """State of the controller."""
 
     landed_state: LandedState
-    integral_world: Vec3  # of the position error [m s]
-    integral_angles: Vec3  # of the errors of roll, pitch and yaw [rad s]
+    integral_world: Vec3  # [m s] integral of the position error
+    integral_angles: Vec3  # [rad s] integral of the errors of roll, pitch and yaw
     tilt_x: Angle  # reference of the pitch
     tilt_y: Angle  # reference of the tilt to the left, -roll
     cut: VirtualControls  # sign of the part of each control that saturation removed at the last tick

@@ -15,7 +15,7 @@ from lapwing.dynamics.config_error import ConfigError
 EXPECTED = "an expression over metrics of the flight such as \"rmse.x < 0.1 and outcome == 'landed'\""
 FUNCTIONS = {"abs": abs, "min": min, "max": max, "sqrt": math.sqrt}
 LONGEST = 500  # characters of an expression
-MOST_NODES = 200  # of its syntax tree
+MOST_NODES = 200  # limit of its syntax tree
 
 _ALLOWED_NODES = (
     ast.Expression, ast.Constant, ast.Name, ast.Attribute, ast.Load, ast.Tuple, ast.List, ast.Call,
@@ -62,7 +62,7 @@ class Success(SceneTable):
 
 class _Expression(NamedTuple):
     code: CodeType
-    names: frozenset[str]  # of its metrics
+    names: frozenset[str]  # names of its metrics
 
 
 def holds(text: str, figures: Mapping[str, Any]) -> bool:

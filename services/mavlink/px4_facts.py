@@ -41,7 +41,7 @@ def _setting(name: str, default: int, allowed: Collection[int], at_reboot: bool 
 
 
 SYSTEM_ID, COMPONENT_ID, TYPE = "MAV_SYS_ID", "MAV_COMP_ID", "MAV_TYPE"
-PRESSURE_OFFSET = "SENS_DPRES_OFF"  # of the airspeed sensor, subtracted from its readings
+PRESSURE_OFFSET = "SENS_DPRES_OFF"  # offset of the airspeed sensor, subtracted from its readings
 _IDS = range(1, 251)  # PX4's bounds
 _MULTIROTORS = (  # MAV_TYPE that PX4 accepts and flies as a multirotor
     mavlink.MAV_TYPE_QUADROTOR,
@@ -77,7 +77,7 @@ _BATTERY = {  # COM_LOW_BAT_ACT: actions at the critical and at the emergency ch
 }
 _NO_SOURCE, _POWER_MODULE = -1, 0  # BAT1_SOURCE
 MULTIROTOR = 0  # CA_AIRFRAME
-SATELLITES = 16  # of a fix, as in telemetry
+SATELLITES = 16  # satellites of a fix, as in telemetry
 FIRST_MOTOR = 101  # function of an output that drives motor 1
 
 

@@ -34,8 +34,8 @@ class Conventions(NamedTuple):
     home_first: bool  # item 0 of a mission is the home position
     open_value: float  # replaces NaN in the parameters of an item
     bytewise: bool  # integer parameters keep their bytes in the float field
-    mode_name: Callable[[int], str]  # of a heartbeat's custom_mode
-    event_text: Callable[[int, bytes], str] = lambda number, arguments: ""  # of a failsafe's EVENT, "" for others
+    mode_name: Callable[[int], str]  # name of a heartbeat's custom_mode
+    event_text: Callable[[int, bytes], str] = lambda number, arguments: ""  # text of a failsafe's EVENT, "" for others
 
 
 class Stage(Enum):

@@ -12,7 +12,7 @@ from lapwing.services.mavlink.vehicle_description import VehicleDescription
 class FlightMode(NamedTuple):
     """A flight mode that an operator may choose."""
 
-    kind: str  # of the command that enters it; also the mode's name in Status
+    kind: str  # kind of the command that enters it; also the mode's name in Status
     name: str  # displayed
     number: int  # the custom mode
     standard: int = mavlink.MAV_STANDARD_MODE_NON_STANDARD
