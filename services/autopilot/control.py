@@ -95,7 +95,10 @@ def to_heading(yaw: float, v_world: Sequence[float]) -> tuple[float, float]:
 def tilt_targets(
     p: Parameters, yaw: float, integral: Vec3, error: Vec3, error_rate: Vec3, acceleration_world: Vec3
 ) -> tuple[float, float]:
-    """Return the outer loops' tilts [rad] towards the heading and to its left (theory.md, eq. (4.12))."""
+    """Return the outer loops' tilts [rad] towards the heading and to its left (theory.md, eq. (4.12)).
+
+    `error` is that of the position [m], `integral` [m s] and `error_rate` [m/s] belong to it; all in world axes.
+    """
     x, y = to_heading(yaw, error)
     vx, vy = to_heading(yaw, error_rate)
     ix, iy = to_heading(yaw, integral)
@@ -110,7 +113,10 @@ def tilt_targets(
 def collective_control(
     p: Parameters, integral: float, error: float, error_rate: float, acceleration: float, roll: float, pitch: float
 ) -> float:
-    """Return the lift [N] of every rotor, with feed-forward of weight and tilt (theory.md, eq. (4.13))."""
+    """Return the lift [N] of every rotor, with feed-forward of weight and tilt (theory.md, eq. (4.13)).
+
+    `error` is that of the height [m]; `roll` and `pitch` are those of the estimate [rad].
+    """
     collective = output(p.altitude, integral, error, error_rate)
     if p.hover_collective > 0.0:
         upright = max(math.cos(roll) * math.cos(pitch), 0.5)
