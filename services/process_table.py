@@ -23,7 +23,6 @@ class ProcessEntry(NamedTuple):
     """Process of a run."""
 
     name: str
-    service: Callable[[], ModuleType]  # imports its module `service`, so that a process loads only its own
     lock_step: bool  # part of the lock step; required if the run configuration has it
     resolves: bool = False  # has a `resolve.py` although it is not part of the lock step
     needs: tuple[str, ...] = ()  # fields of the process specification that it reads besides the run configuration
@@ -31,106 +30,83 @@ class ProcessEntry(NamedTuple):
     mode: str = "peer"  # mode of its Zenoh session
     foreign: bool = False  # flies a foreign firmware instead of the autopilot
 
+    def service(self) -> ModuleType:
+        """Import and return the module `service`; a process loads only its own."""
+        match self.name:
+            case "plant":
+                from lapwing.services.plant import service as plant
 
-def _plant() -> ModuleType:
-    from lapwing.services.plant import service
+                return plant
+            case "sensors":
+                from lapwing.services.sensors import service as sensors
 
-    return service
+                return sensors
+            case "autopilot":
+                from lapwing.services.autopilot import service as autopilot
 
+                return autopilot
+            case "betaflight":
+                from lapwing.services.betaflight import service as betaflight
 
-def _sensors() -> ModuleType:
-    from lapwing.services.sensors import service
+                return betaflight
+            case "ardupilot":
+                from lapwing.services.ardupilot import service as ardupilot
 
-    return service
+                return ardupilot
+            case "px4":
+                from lapwing.services.px4 import service as px4
 
+                return px4
+            case "trajectory":
+                from lapwing.services.trajectory import service as trajectory
 
-def _autopilot() -> ModuleType:
-    from lapwing.services.autopilot import service
+                return trajectory
+            case "formation":
+                from lapwing.services.formation import service as formation
 
-    return service
+                return formation
+            case "fmu":
+                from lapwing.services.fmu import service as fmu
 
+                return fmu
+            case "recorder":
+                from lapwing.services.recorder import service as recorder
 
-def _betaflight() -> ModuleType:
-    from lapwing.services.betaflight import service
+                return recorder
+            case "router":
+                from lapwing.services.router import service as router
 
-    return service
+                return router
+            case "mavlink":
+                from lapwing.services.mavlink import service as mavlink
 
+                return mavlink
+            case "foxglove":
+                from lapwing.services.foxglove import service as foxglove
 
-def _ardupilot() -> ModuleType:
-    from lapwing.services.ardupilot import service
+                return foxglove
+            case "ros2":
+                from lapwing.services.ros2 import service as ros2
 
-    return service
-
-
-def _px4() -> ModuleType:
-    from lapwing.services.px4 import service
-
-    return service
-
-
-def _trajectory() -> ModuleType:
-    from lapwing.services.trajectory import service
-
-    return service
-
-
-def _formation() -> ModuleType:
-    from lapwing.services.formation import service
-
-    return service
-
-
-def _fmu() -> ModuleType:
-    from lapwing.services.fmu import service
-
-    return service
-
-
-def _recorder() -> ModuleType:
-    from lapwing.services.recorder import service
-
-    return service
-
-
-def _router() -> ModuleType:
-    from lapwing.services.router import service
-
-    return service
-
-
-def _mavlink() -> ModuleType:
-    from lapwing.services.mavlink import service
-
-    return service
-
-
-def _foxglove() -> ModuleType:
-    from lapwing.services.foxglove import service
-
-    return service
-
-
-def _ros2() -> ModuleType:
-    from lapwing.services.ros2 import service
-
-    return service
+                return ros2
+        raise AssertionError(self.name)
 
 
 PROCESSES = (
-    ProcessEntry("plant", _plant, True),
-    ProcessEntry("sensors", _sensors, True),
-    ProcessEntry("autopilot", _autopilot, True),
-    ProcessEntry("px4", _px4, True, foreign=True),
-    ProcessEntry("ardupilot", _ardupilot, True, foreign=True),
-    ProcessEntry("betaflight", _betaflight, True, foreign=True),
-    ProcessEntry("trajectory", _trajectory, True),
-    ProcessEntry("formation", _formation, True),
-    ProcessEntry("fmu", _fmu, True),
-    ProcessEntry("recorder", _recorder, False, needs=("log",)),
-    ProcessEntry("router", _router, False, needs=("open",), optional=True, mode="router"),
-    ProcessEntry("mavlink", _mavlink, False, resolves=True, needs=("mavlink",), optional=True),
-    ProcessEntry("foxglove", _foxglove, False, needs=("foxglove",), optional=True),
-    ProcessEntry("ros2", _ros2, False, needs=("ros2",), optional=True),
+    ProcessEntry("plant", True),
+    ProcessEntry("sensors", True),
+    ProcessEntry("autopilot", True),
+    ProcessEntry("px4", True, foreign=True),
+    ProcessEntry("ardupilot", True, foreign=True),
+    ProcessEntry("betaflight", True, foreign=True),
+    ProcessEntry("trajectory", True),
+    ProcessEntry("formation", True),
+    ProcessEntry("fmu", True),
+    ProcessEntry("recorder", False, needs=("log",)),
+    ProcessEntry("router", False, needs=("open",), optional=True, mode="router"),
+    ProcessEntry("mavlink", False, resolves=True, needs=("mavlink",), optional=True),
+    ProcessEntry("foxglove", False, needs=("foxglove",), optional=True),
+    ProcessEntry("ros2", False, needs=("ros2",), optional=True),
 )
 AUTOPILOT, FMU = "autopilot", "fmu"
 RECORDER, ROUTER, MAVLINK, FOXGLOVE, ROS2 = "recorder", "router", "mavlink", "foxglove", "ros2"

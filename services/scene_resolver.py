@@ -39,18 +39,8 @@ def _resolvers() -> dict[str, ModuleType]:
     from lapwing.services.sensors import resolve as sensors
     from lapwing.services.trajectory import resolve as trajectory
 
-    return {
-        "ardupilot": ardupilot,
-        "autopilot": autopilot,
-        "betaflight": betaflight,
-        "fmu": fmu,
-        "formation": formation,
-        "mavlink": mavlink,
-        "plant": plant,
-        "px4": px4,
-        "sensors": sensors,
-        "trajectory": trajectory,
-    }
+    modules = (ardupilot, autopilot, betaflight, fmu, formation, mavlink, plant, px4, sensors, trajectory)
+    return {module.__name__.split(".")[-2]: module for module in modules}
 
 
 def _configurations() -> list[ModuleType]:

@@ -9,20 +9,19 @@ import time
 from collections.abc import Callable
 
 from lapwing.cosim.diagram.compiled_block import InputRing
+from lapwing.kernels import math
 from lapwing.services.ardupilot.exchange import OUTPUTS, PWM_MAX, PWM_MIN, ArduPilotExchange
 from lapwing.services.ardupilot.frame_sequence import Frame, FrameSequence
 from lapwing.services.ardupilot.modes import CONVENTIONS
 from lapwing.services.ardupilot.resolve import LOOP_RATE, NAME, ArduPilotSetup
 from lapwing.services.ardupilot.sample import Samples
 from lapwing.services.ardupilot.servo_packet import ServoPacket, decode, throttle
-from lapwing.services.ardupilot.simulated_sensors import SimulatedSensors
 from lapwing.services.common import ports
 from lapwing.services.common.firmware.datagrams import DatagramSocket, bound_socket
 from lapwing.services.common.firmware.exchange import INVALID, LAST_START, POLL, SEND, Shared, empty_ring
-from lapwing.services.common.firmware.flight_status import poll_flight
 from lapwing.services.common.firmware.link import FirmwareOutput, LinkReport, Read, Waits
 from lapwing.services.common.firmware.mavlink_transport import TcpTransport
-from lapwing.services.common.firmware.mission_client import MissionClient
+from lapwing.services.common.firmware.mission_client import MissionClient, poll_flight
 from lapwing.services.common.firmware.mission_messages import mission_items, mission_messages
 from lapwing.services.common.firmware.program import Program, ProgramLink
 from lapwing.services.common.firmware.setup import FirmwareSetup, first_free
@@ -33,6 +32,34 @@ INSTANCES = 100
 PEER_TIMEOUT = 2.0  # [s] without an answer; after it, another sender is a restarted firmware
 PARAMETERS_FILE = "lapwing.parm"
 PARAMETERS = {"AUTO_OPTIONS": 3.0, "SIM_SPEEDUP": 1000.0}  # arm and take off in AUTO; no time control
+EVERY = 0.2  # [s] between two updates of the simulated sensors
+SAG = 0.7  # [V] that ArduPilot subtracts at full throttle
+
+
+class SimulatedSensors:
+    """Sender of GPS outages and battery voltage to ArduPilot's own sensor models, as parameters of its simulation.
+
+    The JSON interface does not reach them. Sources: ArduPilot, SITL.cpp and SITL_State_common.cpp.
+    """
+
+    def __init__(self, own: ArduPilotSetup, client: MissionClient):
+        """Store the adapter's values and the client."""
+        self._own, self._client = own, client
+        self._fix = True  # as ArduPilot starts
+        self._next = 0.0  # [s] of the next update
+
+    def update(self, time: float, read: Read, motors: tuple[float, ...]) -> None:
+        """Set the parameters at simulation `time` [s]; `motors`: outputs, 0 to 1."""
+        if time < self._next or not self._client.connected:
+            return
+        self._next = time + EVERY
+        if self._own.gps and (fix := read(ports.GPS).valid) != self._fix:
+            self._fix = fix
+            self._client.send_parameter("SIM_GPS_DISABLE", float(not fix))  # name up to version 4.5
+            self._client.send_parameter("SIM_GPS1_ENABLE", float(fix))
+        if math.isfinite((battery := read(ports.BATTERY)).charge):
+            throttle = math.total(motors) / len(motors)
+            self._client.send_parameter("SIM_BATT_VOLTAGE", battery.voltage + SAG * throttle)
 
 
 class ArduPilotLink(ProgramLink):

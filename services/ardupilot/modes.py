@@ -1,6 +1,6 @@
 """Flight modes of ArduCopter, and its conventions on MAVLink."""
 
-from lapwing.services.common.firmware.conventions import Conventions
+from lapwing.services.common.firmware.mission_client import Conventions
 
 NAMES = {
     0: "stabilize", 1: "acro", 2: "altitude hold", 3: "auto", 4: "guided", 5: "loiter", 6: "return", 7: "circle",

@@ -19,7 +19,6 @@ from lapwing.services.common.vehicle_schema import gravity, start_height
 __all__ = ["fleet", "resolve"]
 NAME = "ardupilot"
 LOOP_RATE = 400  # [Hz] of ArduCopter's main loop, which the rate of the exchange must exceed
-SLOWEST = 10.0  # [Hz] at which ArduPilot's clock stops
 
 
 class ArduPilotSetup(NamedTuple):

@@ -50,9 +50,6 @@ class Extras(NamedTuple):
     current: float = math.nan  # [A] drawn
 
 
-NO_EXTRAS = Extras()
-
-
 @always_inline
 def _fits(values: Any) -> bool:
     """Return True if all absolute values are below LIMIT."""

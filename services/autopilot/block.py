@@ -50,7 +50,7 @@ class ControllerState(NamedTuple):
     control: control.State
     failure_detector: motor_failure.State
     still_from: int  # [tick]
-    charge: float  # of the battery, fraction; NaN: unknown
+    charge: float  # charge of the battery, fraction; NaN: unknown
 
 
 def start(p: Controller) -> ControllerState:

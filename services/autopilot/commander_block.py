@@ -28,12 +28,12 @@ from lapwing.services.autopilot.land_detector import LANDED, ON_GROUND
 from lapwing.services.autopilot.mixer import airmode
 from lapwing.services.autopilot.px4 import law as px4_law
 from lapwing.services.autopilot.service_config import AutopilotSetup
-from lapwing.services.autopilot.text_table import TextTable
 from lapwing.services.common import ports
 from lapwing.services.common.autopilot_parameters import PX4_CASCADE, with_gains
 from lapwing.services.common.failure_types import SOUND
 from lapwing.services.common.operator_inbox import merge_commands
 from lapwing.services.common.ports import ImuSelection, Setpoint
+from lapwing.services.common.text_table import TextTable
 
 Operator = Callable[[int], Iterable[Any]]
 

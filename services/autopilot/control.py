@@ -35,7 +35,7 @@ class Command(NamedTuple):
 
     motor_voltage: PerRotor  # [V]
     thrust: PerRotor  # [N]
-    roll_reference: float  # of the inner loop [rad]
+    roll_reference: float  # [rad] reference of the inner loop
     pitch_reference: float  # [rad]
     yaw_reference: float  # [rad]
     finished: bool  # landed, motors off
@@ -50,7 +50,7 @@ class Parameters(NamedTuple):
     pitch_inner: Pid  # [N] over [rad]
     roll_outer: Pid  # [rad] of tilt over [m]
     pitch_outer: Pid  # [rad] over [m]
-    smoothing: Smoothing  # of the tilt references
+    smoothing: Smoothing  # filter of the tilt references
     tilt_limit: float  # [rad] about either axis
     hover_collective: float  # [N] feed-forward of every rotor; 0 without feed-forward
     gravity: float  # [m/s^2]
@@ -67,8 +67,8 @@ class State(NamedTuple):
     """State of the controller."""
 
     landed_state: LandedState
-    integral_world: Vec3  # of the position error [m s]
-    integral_angles: Vec3  # of the errors of roll, pitch and yaw [rad s]
+    integral_world: Vec3  # [m s] integral of the position error
+    integral_angles: Vec3  # [rad s] integral of the errors of roll, pitch and yaw
     tilt_x: Angle  # reference of the pitch
     tilt_y: Angle  # reference of the tilt to the left, -roll
     cut: VirtualControls  # sign of the part of each control that saturation removed at the last tick
@@ -95,7 +95,10 @@ def to_heading(yaw: float, v_world: Sequence[float]) -> tuple[float, float]:
 def tilt_targets(
     p: Parameters, yaw: float, integral: Vec3, error: Vec3, error_rate: Vec3, acceleration_world: Vec3
 ) -> tuple[float, float]:
-    """Return the outer loops' tilts [rad] towards the heading and to its left (theory.md, eq. (4.12))."""
+    """Return the outer loops' tilts [rad] towards the heading and to its left (theory.md, eq. (4.12)).
+
+    `error` is that of the position [m], `integral` [m s] and `error_rate` [m/s] belong to it; all in world axes.
+    """
     x, y = to_heading(yaw, error)
     vx, vy = to_heading(yaw, error_rate)
     ix, iy = to_heading(yaw, integral)
@@ -110,7 +113,10 @@ def tilt_targets(
 def collective_control(
     p: Parameters, integral: float, error: float, error_rate: float, acceleration: float, roll: float, pitch: float
 ) -> float:
-    """Return the lift [N] of every rotor, with feed-forward of weight and tilt (theory.md, eq. (4.13))."""
+    """Return the lift [N] of every rotor, with feed-forward of weight and tilt (theory.md, eq. (4.13)).
+
+    `error` is that of the height [m]; `roll` and `pitch` are those of the estimate [rad].
+    """
     collective = output(p.altitude, integral, error, error_rate)
     if p.hover_collective > 0.0:
         upright = max(math.cos(roll) * math.cos(pitch), 0.5)

@@ -35,7 +35,7 @@ class Gains(NamedTuple):
     roll_outer: Triple  # over [m]
     pitch_outer: Triple  # over [m]
     tilt_limit: float  # [rad]
-    reference_bandwidth: float  # of the tilt references' filter [rad/s]
+    reference_bandwidth: float  # [rad/s] natural frequency of the tilt references' filter
     reference_damping: float
     feed_forward: bool  # weight, tilt, setpoint acceleration, and torque of the tilt references
 
@@ -56,7 +56,7 @@ class Airframe(NamedTuple):
     spin_up_zero: float = 0.0  # [s] torque of rotor acceleration over the change of reaction torque
     rotor_z: PerRotor = ()  # [m] of tilted rotors
     rotor_axis: tuple[Vec3, ...] = ()  # unit vector of each rotor's thrust, body; (): body z
-    wakes: WakeSlopes = WakeSlopes()  # of rotors in the wakes of others; thrusts are those of isolated rotors
+    wakes: WakeSlopes = WakeSlopes()  # coupling of rotors in the wakes of others; thrusts are those of isolated rotors
 
 
 def build(gains: Gains, airframe: Airframe, geometric: bool = False) -> Parameters:
@@ -66,7 +66,7 @@ def build(gains: Gains, airframe: Airframe, geometric: bool = False) -> Paramete
         ValueError: the airframe cannot hover in balance.
     """
     thrust_max = python_function(thrust_at)(airframe.motor, airframe.voltage_max)  # avoids compilation at the start
-    weight = airframe.mass * airframe.gravity / lift(airframe)  # of a rotor
+    weight = airframe.mass * airframe.gravity / lift(airframe)  # [N] share of a rotor
     share, needed = shares(airframe), hover_thrust(airframe)
     if thrust_max <= needed:
         raise ValueError(f"maximum thrust of {thrust_max:.1f} N per rotor is below the {needed:.1f} N needed to hover")

@@ -8,8 +8,8 @@ from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple
 from lapwing.services.common.ports import PerRotor
 
-Share = tuple[float, float, float, float]  # of a rotor in collective, roll, pitch, yaw
-Shares = tuple[Share, ...]  # of every rotor
+Share = tuple[float, float, float, float]  # share of a rotor in collective, roll, pitch, yaw
+Shares = tuple[Share, ...]  # shares of every rotor
 # MC_AIRMODE: virtual controls for which the collective is raised
 AIRMODE_DISABLED, AIRMODE_ROLL_PITCH, AIRMODE_ROLL_PITCH_YAW = 0, 1, 2
 

@@ -16,7 +16,7 @@ class Motor(NamedTuple):
     thrust_coefficient: float  # thrust over the square of the propeller's speed [N/(rad/s)^2]
     gear_ratio: float  # propeller speed / motor speed
     speed_constant: float  # KV [rpm/V]
-    time_constant: float  # of the first-order lag of the speed [s]
+    time_constant: float  # [s] first-order lag of the speed
 
 
 @always_inline

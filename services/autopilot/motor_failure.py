@@ -30,7 +30,7 @@ class Parameters(NamedTuple):
     roll_arm: PerRotor  # [m] torque about body x per 1 N of each rotor's thrust
     pitch_arm: PerRotor  # [m] torque about body y per 1 N of each rotor's thrust
     inertia_body: Vec3  # [kg m^2]
-    time_constant: float  # of the rotor speeds [s]
+    time_constant: float  # [s] first-order lag of the rotor speeds
     hover_thrust: float  # thrust of each rotor [N]
     gravity: float  # [m/s^2]
     enabled: bool  # False: no failure is detected

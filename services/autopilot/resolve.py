@@ -11,16 +11,14 @@ from lapwing.services.autopilot.custom.user_code_loader import controller_rate, 
 from lapwing.services.autopilot.estimator import Estimator
 from lapwing.services.autopilot.estimator.filter_parameters import NO_STATIC_PRESSURE_ERROR
 from lapwing.services.autopilot.gains import GainSet
-from lapwing.services.autopilot.height_sensor import distance_sensor
-from lapwing.services.autopilot.initial_estimate import EXACT
 from lapwing.services.autopilot.nominal_airframe import known_airframe
-from lapwing.services.autopilot.schema import ESTIMATORS, Autopilot
+from lapwing.services.autopilot.schema import ESTIMATORS, Autopilot, distance_sensor
 from lapwing.services.autopilot.service_config import AutopilotSetup, CustomCode
 from lapwing.services.common import autopilot_parameters, ports, user_modules
 from lapwing.services.common.communication_schema import Communication, Rates, ticks
 from lapwing.services.common.environment_schema import environment, known_magnetic_field
 from lapwing.services.common.firmware.schema import flown_by_firmware
-from lapwing.services.common.ports import AutopilotStatus, EstimateCovariance, MotorCommand, Setpoint
+from lapwing.services.common.ports import AutopilotStatus, EstimateCovariance, MotorCommand, Setpoint, StateEstimate
 from lapwing.services.common.run_schema import follows_trajectory
 from lapwing.services.common.vehicle_schema import gravity, start_place
 
@@ -55,7 +53,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         config.attitude_error == "so3",
         known_airframe(scene),
         tuple(autopilot_parameters.table(scene).values()),
-        _phases(scene) if follows else (),
+        tuple(phase.name for phase in scene.lookup("trajectory.phase")) if follows else (),
         config.accept_commands,
         (),
         ticks(scene, min(rates.estimate, exchange.rate), "rates.estimate"),
@@ -73,7 +71,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         tuple(inputs),
         (
             Port(ports.ACTUATORS, MotorCommand(no_voltage, False, no_voltage, (0.0, 0.0, 0.0))),
-            Port(ports.ESTIMATE, EXACT),
+            Port(ports.ESTIMATE, StateEstimate()),
             Port(ports.SETPOINT, Setpoint()),
             Port(ports.STATUS, AutopilotStatus(), setup.status_every),
             *([] if exact or user_code else [_covariance(scene)]),
@@ -84,10 +82,6 @@ def resolve(scene: Scene) -> ServiceConfig | None:
 def _covariance(scene: Scene) -> Port:
     every = ticks(scene, min(scene[Rates].covariance, scene[Communication].rate), "rates.covariance")
     return Port(ports.ESTIMATE_COVARIANCE, EstimateCovariance(), every)
-
-
-def _phases(scene: Scene) -> tuple[str, ...]:
-    return tuple(phase.name for phase in scene.lookup("trajectory.phase"))
 
 
 def _controller(scene: Scene) -> CustomCode | None:

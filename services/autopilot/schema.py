@@ -10,10 +10,9 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.kernels import math
 from lapwing.services.autopilot.controller_parameters import Airframe, build, hover_thrust, hover_torque
 from lapwing.services.autopilot.gains import FOLDER, GainSet
-from lapwing.services.autopilot.height_sensor import distance_sensor
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.common import autopilot_parameters as parameters
-from lapwing.services.common import user_code, user_modules
+from lapwing.services.common import ports, user_code, user_modules
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.firmware.schema import FIRMWARES, FirmwareKeys, is_foreign
 from lapwing.services.common.parameter_file import parse
@@ -21,9 +20,19 @@ from lapwing.services.common.vehicle_schema import Effects, airframe
 
 ESTIMATORS = ("kalman", "ground_truth")
 NEEDED = ("imu", "magnetometer", "gps")  # sensors that the filter needs to start
+DOWN = -90.0  # [deg] elevation of a vertical ray
 WEAKEST_FIELD = 1e-6  # [T] horizontal; at 5e-6 T aviation calls compasses unreliable
 
 Option = bool | int | float | str | list[float]
+
+
+def distance_sensor(scene: Scene) -> str | None:
+    """Return the port of the sonar, or of a rangefinder that points straight down. Return None without either."""
+    installed = scene.tables("sensors")
+    if ports.SONAR in installed:
+        return ports.SONAR
+    points_down = ports.RANGEFINDER in installed and scene.lookup("sensors.rangefinder.elevation_deg") == DOWN
+    return ports.RANGEFINDER if points_down else None
 
 
 class Autopilot(FirmwareKeys):

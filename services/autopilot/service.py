@@ -11,6 +11,7 @@ from lapwing.kernels.cell import Cell
 from lapwing.messages import topics as topic
 from lapwing.services.autopilot import block, imu_vote, motor_failure
 from lapwing.services.autopilot.block import FLIGHT, NO_TRAJECTORY, ORDER, Controller, Flight
+from lapwing.services.autopilot.commander.prearm_checks import NOT_STARTED
 from lapwing.services.autopilot.commander.wakeup_conditions import battery_thresholds
 from lapwing.services.autopilot.commander_block import CommanderBlock, Operator, controller, flies_px4_cascade
 from lapwing.services.autopilot.commander_wakeup import WakeupParameters
@@ -27,7 +28,6 @@ from lapwing.services.autopilot.estimator.blocks.inertial import STANDSTILL_EVER
 from lapwing.services.autopilot.estimator.blocks.navigation_state import blank
 from lapwing.services.autopilot.estimator.blocks.terrain_height import GroundReference
 from lapwing.services.autopilot.failure_injection.injection_blocks import Injection
-from lapwing.services.autopilot.initial_estimate import estimate_before_start
 from lapwing.services.autopilot.px4 import block as px4_block
 from lapwing.services.autopilot.px4 import law as px4_law
 from lapwing.services.autopilot.px4.block import Px4Controller
@@ -36,7 +36,7 @@ from lapwing.services.common import ports
 from lapwing.services.common.airspeed_encoder import airspeed_encoder
 from lapwing.services.common.autopilot_parameters import GPS_HEIGHT, SONAR_HEIGHT
 from lapwing.services.common.failure_types import SOUND, Faults, with_satellites
-from lapwing.services.common.ports import EstimateCovariance
+from lapwing.services.common.ports import EstimateCovariance, StateEstimate
 
 NAME = "autopilot"
 NO_HEIGHT = 1e8  # [m^2] variance of an ignored height
@@ -137,7 +137,8 @@ def _navigation(
         if port in known_ports:
             reading = InputPort(injection.received(port))
             parts.append(Block(f"{NAME}.{port}", fusion, state, (reading,), (), known_ports[port].period))
-    estimate_block = FilterEstimate(p, wakeup, estimate_before_start(config.start_world))
+    before_start = StateEstimate(position_world=config.start_world, health=NOT_STARTED)
+    estimate_block = FilterEstimate(p, wakeup, before_start)
     parts.append(Block(f"{NAME}.estimate", estimate_block, state, (battery, flight), (estimate,)))
     if ports.ESTIMATE_COVARIANCE in known_ports:  # not in logs of former versions
         covariance_port = known_ports[ports.ESTIMATE_COVARIANCE]

@@ -28,7 +28,7 @@ class AutopilotSetup(NamedTuple):
     geometric: bool  # attitude error on SO(3) instead of Euler angles
     airframe: Airframe
     parameters: tuple[Parameter, ...]
-    phases: tuple[str, ...]  # of the scene's trajectory; empty without one
+    phases: tuple[str, ...]  # phases of the scene's trajectory; empty without one
     operator: bool  # commands are accepted
     plan: tuple[Any, ...]  # operator commands at the first tick
     estimate_every: int  # [ticks] between two messages of the estimate

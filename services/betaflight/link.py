@@ -43,7 +43,7 @@ class Pace:
         """Store the report."""
         self._report = report
         self._next = self._sent = 0.0  # [s] of the wall clock
-        self._count = self._sum = self._squares = 0.0  # of the times [s] between packets
+        self._count = self._sum = self._squares = 0.0  # sums of the times [s] between packets
 
     def wait(self, interval: float, rate: float) -> None:
         """Wait until `interval` [s] after the last packet; `rate`: simulation time per wall time."""
@@ -81,13 +81,13 @@ class BetaflightLink(ProgramLink):
         self._socket: socket.socket | None = None
         self._status = msp.FirmwareStatus(False, (), 0.0)
         self._outputs: tuple[float, ...] = (0.0,) * 4
-        self._sender: tuple[str, int] | None = None  # of the motor outputs
+        self._sender: tuple[str, int] | None = None  # sender of the motor outputs
         self._armed = False
         self._output_at = 0.0  # [s] wall time of the last motor outputs
         self._pace = Pace(self.report)
         self._clock_rate = pilot.clock_rate
         self._stamp = TIME  # [s] in all packets
-        self._rate = 1.0  # of the firmware's clock
+        self._rate = 1.0  # rate of the firmware's clock
         self._rc_at = self._status_at = -math.inf  # [s] simulation time
         self._sticks = OFF
 

@@ -18,4 +18,4 @@ class Betaflight(SceneTable):
     velocity_gain: float = Field(default=3.0, ge=0.0)  # [1/s]
     integral_gain: float = Field(default=0.6, ge=0.0)  # [1/s^3]
     yaw_gain: float = Field(default=2.0, ge=0.0)  # [1/s]
-    clock_rate: float = Field(default=1.0, ge=0.02, le=1.0)  # of the firmware over wall time; below 1: a busy machine
+    clock_rate: float = Field(default=1.0, ge=0.02, le=1.0)  # firmware's time over wall time; below 1: a busy machine

@@ -1,9 +1,7 @@
 """Conversion of Lapwing's samples to Betaflight's state packet and to the pilot's measured motion."""
 
-import math
-
 from lapwing.dynamics.geodesy import enu_to_geodetic, geodetic_to_enu
-from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion, conjugate, rotate
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, conjugate, rotate, to_roll_pitch_yaw
 from lapwing.dynamics.vector import ZERO, Vec3
 from lapwing.kernels import python_function
 from lapwing.services.betaflight.packets import State
@@ -15,6 +13,7 @@ from lapwing.services.common.firmware.link import Read
 STANDARD_PRESSURE = 101325.0  # [Pa] without a barometer
 _to_geodetic, _to_enu = python_function(enu_to_geodetic), python_function(geodetic_to_enu)
 _rotate, _conjugate = python_function(rotate), python_function(conjugate)
+_angles = python_function(to_roll_pitch_yaw)
 
 
 class StateSource:
@@ -55,15 +54,10 @@ class StateSource:
         self.state = state
         elapsed = min(time - self._fixed_at, 1.0)
         position = tuple(p + v * elapsed for p, v in zip(self._position, self._velocity, strict=True))
-        return Motion(position, self._velocity, _yaw(state.attitude))  # type: ignore[arg-type]
+        return Motion(position, self._velocity, _angles(state.attitude)[2])  # type: ignore[arg-type]
 
 
 def _specific_force(truth: ports.TrueState, gravity: float) -> Vec3:
     ax, ay, az = truth.acceleration_world
     result: Vec3 = _rotate(_conjugate(truth.attitude), (ax, ay, az + gravity))
     return result
-
-
-def _yaw(q: Quaternion) -> float:
-    w, x, y, z = q
-    return math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))

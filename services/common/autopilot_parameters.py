@@ -128,7 +128,7 @@ _LOOPS = {
     "yaw": "PID_YAW",
 }
 _TERMS = "PID"
-_UNITS = {"altitude": "N/m", "pitch_outer": "rad/m", "roll_outer": "rad/m"}  # of P; the other loops': N/rad
+_UNITS = {"altitude": "N/m", "pitch_outer": "rad/m", "roll_outer": "rad/m"}  # units of P; N/rad for the other loops
 
 
 PX4_CASCADE = "px4"  # controller with PX4's gains

@@ -6,7 +6,6 @@ from pydantic import Field
 
 from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.messages.topics import Topic
 
 
 class Communication(SceneTable):
@@ -71,10 +70,3 @@ def ticks(scene: Scene, rate: float, key: str) -> int:
         divisors = ", ".join(str(exchange // n) for n in range(1, 51) if exchange % n == 0)
         raise ConfigError(key, f"got {rate:g}", f"a rate that divides communication.rate = {exchange} Hz ({divisors})")
     return int(exchange // rate)
-
-
-def period(scene: Scene, topic: Topic) -> int:
-    """Return the ticks between two messages of a topic; the topic table names the scene key of its rate."""
-    if topic.rate is None:
-        return 1
-    return ticks(scene, min(scene.lookup(topic.rate), scene[Communication].rate), topic.rate)

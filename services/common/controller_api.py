@@ -63,7 +63,7 @@ class VehicleModel(NamedTuple):
     inertia_body: Vec3  # [kg m^2] principal moments
     gravity: float  # [m/s^2]
     rotor_positions_body: tuple[Vec3, ...]  # [m]
-    spin_directions: tuple[float, ...]  # of each rotor: +1 if its thrust yaws the vehicle to the left
+    spin_directions: tuple[float, ...]  # +1 for each rotor whose thrust yaws the vehicle to the left
     torque_per_thrust: float  # [m] reaction torque of a rotor over its thrust
     thrust_max: float  # [N] of a rotor
     voltage_max: float  # [V]

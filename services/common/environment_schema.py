@@ -112,7 +112,7 @@ class EnvironmentTable(SceneTable):
 
     TABLE: ClassVar[str] = "environment"
     SHARED: ClassVar[bool] = True
-    date: str = Field(default="2025-07-01", pattern=r"^\d{4}-\d{2}-\d{2}$")  # of the magnetic field
+    date: str = Field(default="2025-07-01", pattern=r"^\d{4}-\d{2}-\d{2}$")  # date of the magnetic field
     gravity_model: Literal["standard", "wgs84"] = "standard"  # 9.80665 m/s^2, or from home's latitude
     gravity: float | None = Field(default=None, ge=0.0, le=30.0)  # [m/s^2] at sea level, instead of the model's
     magnetic_field: MagneticField | None = None  # [T] east, north, up; default: the World Magnetic Model at home

@@ -18,7 +18,7 @@ OF_SYSTEMS = {"battery": (SOUND, OFF, STUCK, WRONG), "motor": (SOUND, OFF, STUCK
 class Faults(NamedTuple):
     """Failure type of each unit."""
 
-    gyro: tuple[int, ...] = (SOUND,)  # of each inertial measurement unit
+    gyro: tuple[int, ...] = (SOUND,)  # one for each inertial measurement unit
     accelerometer: tuple[int, ...] = (SOUND,)
     magnetometer: int = SOUND
     barometer: int = SOUND
@@ -28,7 +28,7 @@ class Faults(NamedTuple):
     airspeed: int = SOUND
     battery: int = SOUND
     battery_charge: float = 0.0  # fraction that a wrong battery reports
-    motors: tuple[int, ...] = ()  # of each motor
+    motors: tuple[int, ...] = ()  # one for each motor
 
 
 SATELLITES, FIX_SATELLITES = "SIM_GPS_USED", 4  # parameter, and its minimum with a fix, as in PX4

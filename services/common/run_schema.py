@@ -21,7 +21,7 @@ class Run(SceneTable):
     TABLE: ClassVar[str] = "run"
     SHARED: ClassVar[bool] = True
     title: str = ""  # one line for `lapwing scenes`
-    seed: int = Field(default=1, ge=0, lt=2**63)  # of all random numbers; equal seeds give bit-for-bit equal runs
+    seed: int = Field(default=1, ge=0, lt=2**63)  # seed of all random numbers; equal seeds give bit-for-bit equal runs
     duration: float = Field(gt=0.0, le=1e6)  # [s] latest end of the run
     stop_delay: float = Field(default=1.0, ge=0.0)  # [s] from the end of the mission to the end of the run
     real_time_factor: float | None = Field(default=None, gt=0.0)  # simulated over wall time; unset: unlimited

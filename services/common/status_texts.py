@@ -28,7 +28,7 @@ AS_COMMANDED, AFTER_LANDING, NO_TAKEOFF = "as commanded", "landed", "no takeoff 
 """Reasons for disarming."""
 TAKEN_OVER = "{}: {}"  # reason and mode of a failsafe
 
-IMU_FAILED = "IMU {} has failed, IMU {} is in use"  # of redundant units
+IMU_FAILED = "IMU {} has failed, IMU {} is in use"  # for redundant units
 
 ROUTINE = frozenset((ARMED, LANDED, *[DISARMED.format(reason) for reason in (AS_COMMANDED, AFTER_LANDING, NO_TAKEOFF)]))
 """Texts of events that every flight has."""

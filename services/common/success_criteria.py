@@ -11,18 +11,19 @@ from pydantic import Field
 
 from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.services.common.success_types import check_types
 
 EXPECTED = "an expression over metrics of the flight such as \"rmse.x < 0.1 and outcome == 'landed'\""
 FUNCTIONS = {"abs": abs, "min": min, "max": max, "sqrt": math.sqrt}
 LONGEST = 500  # characters of an expression
-MOST_NODES = 200  # of its syntax tree
+MOST_NODES = 200  # limit of its syntax tree
 
 _ALLOWED_NODES = (
     ast.Expression, ast.Constant, ast.Name, ast.Attribute, ast.Load, ast.Tuple, ast.List, ast.Call,
     ast.BoolOp, ast.boolop, ast.Compare, ast.cmpop, ast.UnaryOp, ast.USub, ast.Not,
     ast.BinOp, ast.Add, ast.Sub, ast.Mult, ast.Div,
 )  # fmt: skip
+TEXTS = frozenset({"outcome", "outcome_text"})  # metrics that are texts; all others are numbers
+NUMBER, TEXT, TRUTH, LIST = "a number", "a text", "true or false", "a list"
 
 
 class Success(SceneTable):
@@ -42,7 +43,7 @@ class Success(SceneTable):
                 excerpt = text if len(text) <= 80 else f"{text[:77]}..."
                 raise ConfigError(f"success.require.{i}", f"got {excerpt!r}", EXPECTED) from None
             try:
-                check_types(ast.parse(text.strip(), mode="eval").body)
+                _check_types(ast.parse(text.strip(), mode="eval").body)
                 _check_constants(text)
             except ValueError as error:
                 expected = 'a condition such as "rmse.x < 0.1"'
@@ -61,7 +62,7 @@ class Success(SceneTable):
 
 class _Expression(NamedTuple):
     code: CodeType
-    names: frozenset[str]  # of its metrics
+    names: frozenset[str]  # names of its metrics
 
 
 def holds(text: str, figures: Mapping[str, Any]) -> bool:
@@ -158,3 +159,49 @@ class _Lookup(ast.NodeTransformer):
 
 def _is_text(node: ast.expr) -> bool:
     return isinstance(node, ast.Constant) and isinstance(node.value, str)
+
+
+def _check_types(tree: ast.expr) -> None:
+    """Raise ValueError with one line for a result that is not true or false, or a comparison of different types."""
+    if (kind := _kind(tree)) != TRUTH:
+        raise ValueError(f"{ast.unparse(tree)!r} is {kind}, not true or false")
+
+
+def _kind(node: ast.expr) -> str:
+    match node:
+        case ast.Constant(value=bool()) | ast.Compare() | ast.BoolOp() | ast.UnaryOp(op=ast.Not()):
+            _check_parts(node)
+            return TRUTH
+        case ast.Constant(value=str()):
+            return TEXT
+        case ast.Name() | ast.Attribute():
+            return TEXT if ast.unparse(node) in TEXTS else NUMBER
+        case ast.Tuple() | ast.List():
+            return LIST
+        case _:
+            return NUMBER
+
+
+def _check_parts(node: ast.expr) -> None:
+    match node:
+        case ast.BoolOp(values=values):
+            for value in values:
+                _check_types(value)
+        case ast.UnaryOp(operand=operand):
+            _check_types(operand)
+        case ast.Compare(left=left, ops=ops, comparators=others):
+            for left_side, op, other in zip((left, *others), ops, others, strict=False):
+                _check_comparison(left_side, op, other)
+
+
+def _check_comparison(left: ast.expr, op: ast.cmpop, other: ast.expr) -> None:
+    members = [other]
+    if isinstance(op, ast.In | ast.NotIn):
+        if isinstance(other, ast.Tuple | ast.List):
+            members = list(other.elts)
+        elif _kind(other) != TEXT:
+            raise ValueError(f"{ast.unparse(other)!r} is {_kind(other)}, not a list")
+    for member in members:
+        kinds = _kind(left), _kind(member)
+        if kinds[0] != kinds[1]:
+            raise ValueError(f"{ast.unparse(left)!r} is {kinds[0]}, {ast.unparse(member)!r} is {kinds[1]}")

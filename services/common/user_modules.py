@@ -18,11 +18,6 @@ class Modules(SceneTable):
     model_config = ConfigDict(extra="allow", frozen=True)
     __pydantic_extra__: dict[str, str]
 
-    @property
-    def texts(self) -> dict[str, str]:
-        """Source texts by module name."""
-        return dict(self.__pydantic_extra__)
-
 
 def embed(tree: dict[str, Any], files: Files, key: str, module: str) -> None:
     """Store the text of a module, and of the neighbouring modules that it imports, in the table `modules`.
@@ -42,4 +37,4 @@ def embed(tree: dict[str, Any], files: Files, key: str, module: str) -> None:
 
 def texts(scene: Scene) -> dict[str, str]:
     """Return the module texts of a scene by name."""
-    return scene[Modules].texts if scene.has(Modules) else {}
+    return dict(scene[Modules].__pydantic_extra__) if scene.has(Modules) else {}

@@ -4,6 +4,7 @@ import ctypes
 import math
 from typing import Any
 
+from lapwing.kernels.native_calls import address_of
 from lapwing.services.fmu.service_config import CLOCK
 from lapwing.services.fmu.stepping import UPDATES, WARNING
 from lapwing.services.fmu.variable_group import Group
@@ -31,7 +32,7 @@ class FmuInstance:
         self._instantiate()
         component = fmu.component
         is_number = isinstance(component, int)
-        self.address = component if is_number else int(ctypes.cast(component, ctypes.c_void_p).value or 0)
+        self.address = component if is_number else address_of(component)
         self.component = ctypes.c_void_p(self.address)
         if self.is_3:
             self._update_function = self.function("UpdateDiscreteStates")
@@ -43,13 +44,13 @@ class FmuInstance:
 
     def _instantiate(self) -> None:
         if self.is_3:
-            self.fmu.instantiate(logMessage=self._log3, **self.instantiate_options())
+            self.fmu.instantiate(logMessage=self._log, **self.instantiate_options())
             return
         from fmpy import fmi2
 
         self._callbacks = fmi2.fmi2CallbackFunctions()
         ctypes.pointer(self._callbacks)[0] = fmi2.defaultCallbacks
-        self._callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._log2)
+        self._callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(self._log)
         self.fmu.instantiate(callbacks=self._callbacks)
 
     def instantiate_options(self) -> dict[str, Any]:
@@ -157,8 +158,6 @@ class FmuInstance:
             last = f": {' '.join(self.messages[-1].split())}" if self.messages else ""
             raise ValueError(f"{function} failed with status {status}{last}")
 
-    def _log3(self, environment: Any, status: int, category: bytes, message: bytes) -> None:
-        self.messages[:] = [(message or b"").decode(errors="replace")]
-
-    def _log2(self, environment: Any, name: bytes, status: int, category: bytes, message: bytes) -> None:
-        self.messages[:] = [(message or b"").decode(errors="replace")]
+    def _log(self, *arguments: Any) -> None:
+        """Store the message of a callback of either version of FMI, its last argument."""
+        self.messages[:] = [(arguments[-1] or b"").decode(errors="replace")]

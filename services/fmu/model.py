@@ -14,14 +14,7 @@ from lapwing.services.common.field_units import field_unit, parse_unit
 from lapwing.services.common.ports import EFFECT
 from lapwing.services.fmu.description import Description, NamedUnit, content_of, start_elements
 from lapwing.services.fmu.schema import FmuTable
-from lapwing.services.fmu.service_config import (
-    MODEL_EXCHANGE,
-    Connection,
-    Element,
-    FmuConfig,
-    StartValue,
-    own_port,
-)
+from lapwing.services.fmu.service_config import MODEL_EXCHANGE, Connection, Element, FmuConfig, StartValue, own_port
 
 INTEGRATOR, ACCURACY = "rk4", 1e-8
 

@@ -5,12 +5,12 @@ import math
 from typing import Any
 
 from lapwing.dynamics import integrators
+from lapwing.kernels.native_calls import address_of
 from lapwing.services.fmu.derivatives import FmuFunctions, advance_states
 from lapwing.services.fmu.instance import FmuInstance
 from lapwing.services.fmu.stepping import UPDATES
 
 WIDTH = 1e-12  # [s] length of the interval that contains a state event
-
 SLACK = 1e-9  # relative to a step: a time event this close to its end belongs to the step
 
 
@@ -26,11 +26,9 @@ class ModelExchange(FmuInstance):
         modes = "EnterEventMode", "EnterContinuousTimeMode"
         self._enter_event_mode, self._enter_continuous_time_mode = map(self.function, modes)
         derivatives = "GetContinuousStateDerivatives" if self.is_3 else "GetDerivatives"
-        set_time, set_states, get = map(self._address, ("SetTime", "SetContinuousStates", derivatives))
+        names = "SetTime", "SetContinuousStates", derivatives
+        set_time, set_states, get = (address_of(self.function(name)) for name in names)
         self._functions = FmuFunctions(set_time, set_states, get, self.address, ctypes.addressof(self._status))
-
-    def _address(self, name: str) -> int:
-        return int(ctypes.cast(self.function(name), ctypes.c_void_p).value or 0)
 
     def after_initialisation(self) -> None:
         """Update the discrete states until they converge, and enter continuous-time mode."""

@@ -2,10 +2,12 @@
 
 import ctypes
 import math
+from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from lapwing.services.fmu.clocks import COUNTDOWN, DESCRIPTION, PERIODIC, TRIGGERED, Clock, input_clocks
+from lapwing.kernels.native_calls import address_of
+from lapwing.services.fmu.clocks import COUNTDOWN, DESCRIPTION, PERIODIC, TRIGGERED, input_clocks
 from lapwing.services.fmu.instance import FmuInstance
 from lapwing.services.fmu.service_config import CLOCK
 from lapwing.services.fmu.stepping import UPDATES
@@ -20,10 +22,10 @@ class ScheduledExecution(FmuInstance):
     def __init__(self, spec: dict[str, Any], model: Any, fmu: Any, inputs: Any, outputs: Any):
         """See `FmuInstance`."""
         super().__init__(spec, model, fmu, inputs, outputs)
-        address = ctypes.cast(self.function("ActivateModelPartition"), ctypes.c_void_p).value or 0
+        address = address_of(self.function("ActivateModelPartition"))
         # not FMPy's method, which has an argument from before the release of FMI 3.0
         self._run = ctypes.CFUNCTYPE(ctypes.c_int, ctypes.c_void_p, ctypes.c_uint32, ctypes.c_double)(address)
-        clocks = sorted(input_clocks(Path(spec["folder"], DESCRIPTION).read_bytes()), key=_priority)
+        clocks = sorted(input_clocks(Path(spec["folder"], DESCRIPTION).read_bytes()), key=attrgetter("priority"))
         self._due = {clock: clock.shift if clock.variability in PERIODIC else math.inf for clock in clocks}
         self._ticks = dict.fromkeys(clocks, 0)  # tick counts of periodic clocks, so that no time errors accumulate
         by_reference = {clock.reference: clock for clock in clocks if clock.variability == TRIGGERED}
@@ -76,10 +78,6 @@ class ScheduledExecution(FmuInstance):
         for clock, interval, qualifier in zip(self._countdowns, self._intervals, self._qualifiers, strict=True):
             if qualifier == CHANGED:
                 self._due[clock] = now + interval
-
-
-def _priority(clock: Clock) -> int:
-    return clock.priority
 
 
 def _clocks_of(connections: list[Any]) -> list[tuple[int, int]]:

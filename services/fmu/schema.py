@@ -1,13 +1,13 @@
 """The `[services.NAME]` tables of a scene: FMUs that compute columns of ports."""
 
 import base64
-from collections.abc import Mapping
 from typing import Any, ClassVar, Literal
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from lapwing.cosim.scene import Files, Scene, SceneTable
+from lapwing.cosim.scene import Files, Scene
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.services.common.named_tables import NamedTables
 
 
 class FmuTable(BaseModel):
@@ -27,17 +27,11 @@ class FmuTable(BaseModel):
     timeout: float = Field(default=10.0, gt=0.0)  # [s] limit of the wall time of a step
 
 
-class Services(SceneTable):
+class Services(NamedTables):
     """FMUs by name."""
 
     TABLE: ClassVar[str] = "services"
     OPTIONAL: ClassVar[bool] = True
-    model_config = ConfigDict(extra="allow", frozen=True, allow_inf_nan=False)
-
-    @property
-    def tables(self) -> Mapping[str, Any]:
-        """Tables of the scene by name."""
-        return self.__pydantic_extra__ or {}
 
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
@@ -47,9 +41,8 @@ class Services(SceneTable):
             if isinstance(entry, dict) and isinstance(path := entry.get("fmu"), str):
                 absolute = (files.folder / path).resolve()
                 entry["fmu"] = str(absolute)
-                if (
-                    entry.get("embed") is True and absolute.is_file()
-                ):  # a missing file is reported when the scene is resolved
+                # a missing file is reported when the scene is resolved
+                if entry.get("embed") is True and absolute.is_file():
                     entry["content"] = base64.b64encode(absolute.read_bytes()).decode()
 
     def check(self, scene: Scene) -> None:

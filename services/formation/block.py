@@ -21,7 +21,10 @@ class FormationLaw(NamedTuple):
 
 @always_inline
 def link(load: Vec3, speed: Vec3, positions: tuple[Vec3, ...], velocities: tuple[Vec3, ...], i: int) -> Swing:
-    """Return the direction from quadrotor i to the load and the angular velocity of link i."""
+    """Return the direction from quadrotor i to the load and the angular velocity [rad/s] of link i, world axes.
+
+    Positions are in [m], velocities in [m/s].
+    """
     d = subtract(load, positions[i])
     along = 1.0 / norm(d)
     direction = scale(along, d)

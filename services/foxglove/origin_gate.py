@@ -84,7 +84,7 @@ class OriginGate:
             server: address of the WebSocket server.
 
         Raises:
-            OSError: the address cannot be listened on.
+            OSError: the gate cannot listen at the address.
         """
         self._host, self._server, self.rejected = host, server, 0
         family = socket.AF_INET6 if ":" in host else socket.AF_INET

@@ -68,12 +68,12 @@ class Server:
                 message_backlog_size=BACKLOG,
             )
         except Exception as fault:  # the library raises various classes
-            raise ValueError(f"--foxglove {address}: cannot be listened on: {fault}") from None
+            raise ValueError(f"--foxglove {address}: cannot listen there: {fault}") from None
         try:
             self._gate = OriginGate(host, port, (hidden, self._server.port))
         except OSError as fault:
             self._server.stop()
-            raise ValueError(f"--foxglove {address}: cannot be listened on: {fault}") from None
+            raise ValueError(f"--foxglove {address}: cannot listen there: {fault}") from None
         self.port: int = self._gate.port
 
     def declare(self, topic: str, type_name: str) -> None:

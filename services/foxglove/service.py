@@ -14,7 +14,7 @@ def run(process: Participant, spec: Any) -> None:
     """Serve until the run has ended or this process is requested to stop.
 
     Raises:
-        ValueError: the address cannot be listened on.
+        ValueError: the server cannot listen at the address.
     """
     setup = process.setup
     with Server(spec.foxglove, spec.insecure) as server:

@@ -18,7 +18,7 @@ from lapwing.services.mavlink.mission_store import MissionStore
 from lapwing.services.mavlink.parameter_store import ParameterStore
 from lapwing.services.mavlink.protocols import handlers
 from lapwing.services.mavlink.px4_facts import COMPONENT_ID, SYSTEM_ID
-from lapwing.services.mavlink.session import Session
+from lapwing.services.mavlink.session import LinkState, Session
 from lapwing.services.mavlink.setpoint_keeper import SetpointKeeper
 from lapwing.services.mavlink.signing import Signature, TimeStampStore
 from lapwing.services.mavlink.telemetry.system_status import heartbeat
@@ -76,7 +76,20 @@ class Adapter:
         self.sessions: dict[Endpoint, Session] = {}
         store = TimeStampStore(time_stamps, key, description.system_id) if key and time_stamps else None
         self.signature = Signature(key, store) if key else None
-        self._insecure, self._log = insecure, log
+        self._insecure = insecure
+        self._link = LinkState(
+            self.vehicle,
+            self.clock,
+            self.commands,
+            self.parameters,
+            self.missions,
+            self.setpoints,
+            self.sticks,
+            self.counts,
+            log,
+            self.trusts,
+            self._request_restart,
+        )
         self._announcements = Announcements(self.vehicle, self.broadcast)
         self._restart_requested = False
         self._next_link = 0
@@ -93,24 +106,8 @@ class Adapter:
         """
         channel = Channel(self.vehicle.address, self.signature, datagrams, self.counts, strict)
         endpoint = Endpoint(channel, local, put)
-        self.sessions[endpoint] = self._session(endpoint)
+        self.sessions[endpoint] = Session(endpoint, self._link)
         return endpoint
-
-    def _session(self, endpoint: Endpoint) -> Session:
-        return Session(
-            endpoint,
-            self.vehicle,
-            self.clock,
-            self.commands,
-            self.parameters,
-            self.missions,
-            self.setpoints,
-            self.sticks,
-            self.counts,
-            self._log,
-            self.trusts,
-            self._request_restart,
-        )
 
     def disconnect(self, endpoint: Endpoint) -> None:
         """Remove an endpoint."""
@@ -223,7 +220,7 @@ class Adapter:
             endpoint.set_source(self.vehicle.address)
             self.parameters.forget(endpoint)
             self.missions.forget(endpoint)
-            self.sessions[endpoint] = self._session(endpoint)
+            self.sessions[endpoint] = Session(endpoint, self._link)
 
     def _step(self) -> None:
         self._restart_if_requested()

@@ -6,7 +6,7 @@ from typing import NamedTuple
 class Instant(NamedTuple):
     """Instant on both clocks."""
 
-    time_ns: int = 0  # of the simulation
+    time_ns: int = 0  # [ns] simulation time
     wall: float = 0.0  # [s] monotonic
 
 

@@ -84,7 +84,7 @@ class CommandQueue:
         """Handle acknowledgements of the autopilot."""
         for acknowledgement in acknowledgements:
             waiting = self._waiting.get(acknowledgement.id)
-            if waiting is None or waiting[2] != acknowledgement.source:  # of another sender with its own numbers
+            if waiting is None or waiting[2] != acknowledgement.source:  # another sender with its own numbers
                 continue
             if acknowledgement.result == mavlink.MAV_RESULT_IN_PROGRESS:
                 self._waiting[acknowledgement.id] = waiting[0], self._clock.now, waiting[2]

@@ -22,7 +22,7 @@ _CHECKSUM = struct.Struct("<H")
 class _Kind(NamedTuple):
     """Constants of a message class."""
 
-    attributes: Callable[[Any], tuple]  # of a message object, in wire order
+    attributes: Callable[[Any], tuple]  # fields of a message object, in wire order
     reorder: Callable[[tuple], tuple]  # from the order of the arguments to wire order
     arrays: tuple[int, ...]  # indices of the arrays, in descending order
     layout: struct.Struct  # header, payload, CRC_EXTRA
@@ -84,4 +84,4 @@ def _slow_crc(data: bytes, crc: int) -> int:
 
 
 _MAGIC = mavlink.PROTOCOL_MARKER_V2
-_crc: Callable[[bytes, int], int] = getattr(mavlink, "mcrf4xx", None) or _slow_crc  # of CRC-16/MCRF4XX
+_crc: Callable[[bytes, int], int] = getattr(mavlink, "mcrf4xx", None) or _slow_crc  # CRC-16/MCRF4XX

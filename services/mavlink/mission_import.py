@@ -8,13 +8,9 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
-from lapwing.messages import MissionItem
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.mavlink.geo_coordinates import Datum
-from lapwing.services.mavlink.item_converters import MAX_ITEMS
-from lapwing.services.mavlink.item_fields import CONVERTERS, RejectedItemError, idle
-
-__all__ = ["MAX_ITEMS", "RejectedItemError", "from_mavlink", "texts_of_skipped_items"]
+from lapwing.services.mavlink.item_converters import CONVERTERS, RejectedItemError, idle, new_item
 
 _IDLE = {  # commands for parts that this vehicle does not have
     mavlink.MAV_CMD_DO_SET_ROI_WPNEXT_OFFSET,
@@ -71,11 +67,12 @@ def from_mavlink(items: Sequence[Any], home_first: bool, datum: Datum) -> list[A
         for number, m in enumerate(items)
     ]
     # ArduPilot's ground stations send 0 for an unspecified heading: its copters turn only by CONDITION_YAW.
-    return [_without_heading(i) if home_first and i.action != "yaw" else i for i in result]
-
-
-def _without_heading(i: Any) -> Any:
-    return MissionItem(i.action, i.position, math.nan, i.radius, i.hold_time, i.values)
+    return [
+        new_item(i.action, i.position, math.nan, i.radius, i.hold_time, i.values)
+        if home_first and i.action != "yaw"
+        else i
+        for i in result
+    ]
 
 
 def _item(m: Any, datum: Datum) -> Any:

@@ -10,7 +10,8 @@ from lapwing.services.common.mavlink.mission_export import to_mavlink
 from lapwing.services.mavlink.clock import Clock
 from lapwing.services.mavlink.command_queue import CommandQueue
 from lapwing.services.mavlink.endpoint import Endpoint
-from lapwing.services.mavlink.mission_import import MAX_ITEMS, RejectedItemError, from_mavlink, texts_of_skipped_items
+from lapwing.services.mavlink.item_converters import MAX_ITEMS, RejectedItemError
+from lapwing.services.mavlink.mission_import import from_mavlink, texts_of_skipped_items
 from lapwing.services.mavlink.mission_upload import Repeat, Upload
 from lapwing.services.mavlink.statustext import statustext
 

@@ -9,7 +9,6 @@ from typing import NamedTuple
 
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.vehicle_description import Battery, VehicleDescription
-from lapwing.services.mavlink.vehicle_type import vehicle_type
 
 Values = Mapping[str, float]
 
@@ -42,7 +41,7 @@ def _setting(name: str, default: int, allowed: Collection[int], at_reboot: bool 
 
 
 SYSTEM_ID, COMPONENT_ID, TYPE = "MAV_SYS_ID", "MAV_COMP_ID", "MAV_TYPE"
-PRESSURE_OFFSET = "SENS_DPRES_OFF"  # of the airspeed sensor, subtracted from its readings
+PRESSURE_OFFSET = "SENS_DPRES_OFF"  # offset of the airspeed sensor, subtracted from its readings
 _IDS = range(1, 251)  # PX4's bounds
 _MULTIROTORS = (  # MAV_TYPE that PX4 accepts and flies as a multirotor
     mavlink.MAV_TYPE_QUADROTOR,
@@ -50,6 +49,14 @@ _MULTIROTORS = (  # MAV_TYPE that PX4 accepts and flies as a multirotor
     mavlink.MAV_TYPE_OCTOROTOR,
     mavlink.MAV_TYPE_TRICOPTER,
 )
+_TYPES = {  # MAV_TYPE by number of rotors
+    3: mavlink.MAV_TYPE_TRICOPTER,
+    4: mavlink.MAV_TYPE_QUADROTOR,
+    6: mavlink.MAV_TYPE_HEXAROTOR,
+    8: mavlink.MAV_TYPE_OCTOROTOR,
+    10: mavlink.MAV_TYPE_DECAROTOR,
+    12: mavlink.MAV_TYPE_DODECAROTOR,
+}
 SIM_IMU, SIM_MAG = 1310988, 197388  # device ids of simulated sensors: they need no calibration
 GENERIC_FRAMES = {4: 4001, 6: 6001, 8: 8001}  # SYS_AUTOSTART of 4, 6 and 8 rotors in X
 LOGGED_FROM_BOOT_TO_SHUTDOWN = 2  # SDLOG_MODE
@@ -70,8 +77,16 @@ _BATTERY = {  # COM_LOW_BAT_ACT: actions at the critical and at the emergency ch
 }
 _NO_SOURCE, _POWER_MODULE = -1, 0  # BAT1_SOURCE
 MULTIROTOR = 0  # CA_AIRFRAME
-SATELLITES = 16  # of a fix, as in telemetry
+SATELLITES = 16  # satellites of a fix, as in telemetry
 FIRST_MOTOR = 101  # function of an output that drives motor 1
+
+
+def vehicle_type(rotors: int) -> int:
+    """Return the MAV_TYPE of a multirotor.
+
+    Coaxial rotors count individually, as in PX4 and ArduPilot: MAV_TYPE_COAXIAL is a helicopter.
+    """
+    return _TYPES.get(rotors, mavlink.MAV_TYPE_GENERIC_MULTIROTOR)
 
 
 def output_function(number: int | str) -> str:

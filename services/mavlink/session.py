@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.clock import Clock, Instant
@@ -22,46 +22,33 @@ from lapwing.services.mavlink.vehicle_cache import VehicleCache
 TEXT_PERIOD, MAX_TEXTS = 5.0, 64  # [s] between two equal texts; number of texts that are stored
 
 
+class LinkState(NamedTuple):
+    """State that the conversations with all endpoints share."""
+
+    vehicle: VehicleCache
+    clock: Clock
+    commands: CommandQueue
+    parameters: ParameterStore
+    missions: MissionStore
+    setpoints: SetpointKeeper
+    sticks: SetpointKeeper
+    counts: Counter[str]  # rejected messages by reason
+    log: Path | None  # log of the run
+    trusts: Callable[[Endpoint], bool]  # returns True if commands of an endpoint are accepted
+    restart: Callable[[], None]  # restarts the link after the present message
+
+
 class Session:
     """Conversation with one endpoint."""
 
-    def __init__(
-        self,
-        endpoint: Endpoint,
-        vehicle: VehicleCache,
-        clock: Clock,
-        commands: CommandQueue,
-        parameters: ParameterStore,
-        missions: MissionStore,
-        setpoints: SetpointKeeper,
-        sticks: SetpointKeeper,
-        counts: Counter[str],
-        log: Path | None,
-        trusts: Callable[[Endpoint], bool],
-        restart: Callable[[], None],
-    ):
-        """Start a conversation.
-
-        Args:
-            endpoint: peer.
-            vehicle: newest state of the vehicle.
-            clock: clock of the link.
-            commands: queue of commands to the autopilot.
-            parameters: parameters of the autopilot.
-            missions: items that the vehicle holds.
-            setpoints: keeper of offboard setpoints.
-            sticks: keeper of stick positions.
-            counts: rejected messages by reason.
-            log: log of the run, or None.
-            trusts: returns True if commands of an endpoint are accepted.
-            restart: restarts the link after the present message.
-        """
-        self.endpoint, self.vehicle, self.clock = endpoint, vehicle, clock
-        self.parameters, self.missions, self._setpoints, self._sticks = parameters, missions, setpoints, sticks
-        self.schedule = Schedule(vehicle)
-        self.log = LogServer(log)
-        self.files = FileServer(files(vehicle.description))
-        self._commands, self._counts, self._trusts, self.restart = commands, counts, trusts, restart
+    def __init__(self, endpoint: Endpoint, link: LinkState):
+        """Start a conversation."""
+        self.endpoint, self._link = endpoint, link
+        self.vehicle, self.clock, self.restart = link.vehicle, link.clock, link.restart
+        self.parameters, self.missions = link.parameters, link.missions
+        self.schedule = Schedule(link.vehicle)
+        self.log = LogServer(link.log)
+        self.files = FileServer(files(link.vehicle.description))
         self._sent_texts: dict[str, Instant] = {}
 
     @property
@@ -72,7 +59,7 @@ class Session:
     @property
     def trusted(self) -> bool:
         """True if the endpoint's commands are accepted; counts a rejection."""
-        return self._trusts(self.endpoint)
+        return self._link.trusts(self.endpoint)
 
     def send(self, message: Any) -> None:
         """Send a message to the endpoint."""
@@ -82,17 +69,17 @@ class Session:
         self, kind: str, values: Sequence[float] = (), on_acknowledgement: OnAcknowledgement | None = None
     ) -> None:
         """Queue a command to the autopilot; it must be trusted. `on_acknowledgement` receives every acknowledgement."""
-        self._commands.put(kind, self.endpoint.name, on_acknowledgement, values)
+        self._link.commands.put(kind, self.endpoint.name, on_acknowledgement, values)
 
     def offboard(self, kind: str, values: Sequence[float]) -> None:
         """Queue an offboard setpoint; it must be trusted."""
         self.command(kind, values)
-        self._setpoints.hold(kind, self.endpoint.name, values)
+        self._link.setpoints.hold(kind, self.endpoint.name, values)
 
     def sticks(self, values: Sequence[float]) -> None:
         """Queue stick positions; they must be trusted."""
         self.command("manual", values)
-        self._sticks.hold("manual", self.endpoint.name, values)
+        self._link.sticks.hold("manual", self.endpoint.name, values)
 
     def send_text(self, text: str) -> None:
         """Send the reason of a rejection to this endpoint only, the same text at most every `TEXT_PERIOD` seconds."""
@@ -106,4 +93,4 @@ class Session:
 
     def count(self, reason: str) -> None:
         """Count a rejected message."""
-        self._counts[reason] += 1
+        self._link.counts[reason] += 1

@@ -81,12 +81,16 @@ def _truth_sample(like: TrueState) -> Any:
     )
 
 
+def _pose(x: TrueState, time_ns: np.ndarray) -> Fields:
+    """Return the fields of the body's pose in the world."""
+    pose = {"pose.position": x.position_world, "pose.orientation": quaternion_columns(x.attitude)}
+    return {**stamp_columns(time_ns), **pose}
+
+
 def _truth(x: TrueState, time_ns: np.ndarray) -> Fields:
     """Return the fields of the true state."""
     return {
-        **stamp_columns(time_ns),
-        "pose.position": x.position_world,
-        "pose.orientation": quaternion_columns(x.attitude),
+        **_pose(x, time_ns),
         "velocity": x.velocity_world,
         "angular_velocity": x.omega_body,
         "acceleration": x.acceleration_world,
@@ -98,15 +102,6 @@ def _truth(x: TrueState, time_ns: np.ndarray) -> Fields:
 
 
 _PER_ROTOR = ("rotor_speed", "motor_voltage", "motor_current", "motor_power", "rotor_thrust", "rotor_torque")
-
-
-def _pose(x: TrueState, time_ns: np.ndarray) -> Fields:
-    """Return the fields of the body's pose in the world."""
-    return {
-        **stamp_columns(time_ns),
-        "pose.position": x.position_world,
-        "pose.orientation": quaternion_columns(x.attitude),
-    }
 
 
 def _odometry(x: TrueState, time_ns: np.ndarray) -> Fields:

@@ -1,6 +1,5 @@
 """Resolution of a scene into the plant's configuration, by the model of `vehicle.model`."""
 
-import importlib
 from collections.abc import Mapping
 
 from lapwing.cosim.config.run_config import ServiceConfig
@@ -14,7 +13,7 @@ from lapwing.services.common import ports
 from lapwing.services.common.communication_schema import Rates
 from lapwing.services.common.ports import ContactForces
 from lapwing.services.common.vehicle_schema import Vehicle
-from lapwing.services.plant import fleet_coupling
+from lapwing.services.plant import fleet_coupling, models
 from lapwing.services.plant.blocks.contact import ContactView
 from lapwing.services.plant.blocks.multirotor import MultirotorPlant
 from lapwing.services.plant.models._common import bodies_port, noise_key, rate_ticks
@@ -23,7 +22,7 @@ from lapwing.services.plant.models._common import bodies_port, noise_key, rate_t
 def resolve(scene: Scene) -> ServiceConfig:
     """Return the configuration of the plant; every scene has one."""
     model = scene[Vehicle].model
-    result = importlib.import_module(f"lapwing.services.plant.models.{model}").resolve(scene)
+    result = models.get(model).resolve(scene)
     if scene[Rates].contact_forces is not None:
         result = _with_contact(scene, result)
     if any(isinstance(e, SharedSlungLoad) for e in fleet_coupling.effects_of(result)):

@@ -12,7 +12,7 @@ from lapwing.kernels import math
 from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.vehicle_schema import Vehicle
 
-CONTACT_SHARE = 3e-5  # of solver.accuracy, for a substep in contact: bounces amplify its errors
+CONTACT_SHARE = 3e-5  # fraction of solver.accuracy, for a substep in contact: bounces amplify its errors
 MANY_SUBSTEPS = 1e-4  # accuracy below which the share decreases with the number of substeps, as its fifth root
 LEAST_CONTACT_TOLERANCE = 1e-15  # below it a difference of two substeps is round-off, and no substep is short enough
 

@@ -16,21 +16,24 @@ from lapwing.cosim.processes.patience import Patience
 from lapwing.services.common import ports
 from lapwing.services.common.firmware.exchange import POLL, SEND, Shared, empty_ring
 from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, LinkReport, Read, Waits
+from lapwing.services.common.firmware.mission_client import MissionClient, poll_flight
+from lapwing.services.common.firmware.mission_messages import mission_items, mission_messages
 from lapwing.services.common.firmware.program import Program, ProgramLink
 from lapwing.services.common.firmware.setup import FirmwareSetup, first_free
 from lapwing.services.common.ports import AirspeedReading
 from lapwing.services.px4.connection import Connection, claim
 from lapwing.services.px4.exchange import MESSAGES, OUTPUTS, Px4Exchange
 from lapwing.services.px4.messages import HIL_ACTUATOR_CONTROLS, ActuatorControls, actuator_controls
-from lapwing.services.px4.resolve import Px4Setup
+from lapwing.services.px4.modes import CONVENTIONS
+from lapwing.services.px4.resolve import NAME, Px4Setup
 from lapwing.services.px4.sample import RARE, Readings, at_rest, rare_messages
 from lapwing.services.px4.sensor_frame import payload
 from lapwing.services.px4.stream import stream
-from lapwing.services.px4.vehicle_link import VehicleLink
 
 INSTANCES = 10  # number of instances with separate MAVLink ports
 SECOND = 1_000_000  # [us]
 ANSWER_TIMEOUT = 1.0  # [s] after which a step continues without the answer of PX4
+BATTERY_EVERY = 0.5  # [s] between two states of the battery
 OTHERS_EVERY = 1.0  # [s] between two checks for a second firmware
 
 
@@ -46,7 +49,8 @@ class Px4Link(ProgramLink):
         self.report = LinkReport("px4")
         self._stream = stream()
         self._connection: Connection | None = None
-        self._vehicle: VehicleLink | None = None
+        self._client: MissionClient | None = None
+        self._battery_at = 0.0  # [s] of the next state of the battery
         self._epoch = np.zeros(1, np.int64)  # [us] of PX4's clock at tick 0
         self._last_us = 0  # [us] of the last message
         self._step_us = setup.period * setup.interval_ns // 1000
@@ -80,7 +84,9 @@ class Px4Link(ProgramLink):
         setup = self._setup
         if setup.command:
             self._program = self._start(setup.instance)
-        self._vehicle = VehicleLink(setup, transport)
+        items, parameters = mission_items(setup.plan), {} if setup.command else dict(setup.parameters)
+        messages = mission_messages(items, self._own.datum)
+        self._client = MissionClient(transport, CONVENTIONS, messages, parameters)
         self._connect(waits, self._patience(setup.start_timeout))
         self._epoch[0] = -(-self._last_us // SECOND) * SECOND
         while self._last_us + self._step_us < self._epoch[0]:
@@ -139,29 +145,33 @@ class Px4Link(ProgramLink):
         return None
 
     def _poll(self, tick: int, read: Read) -> FirmwareOutput:
-        """Poll the MAVLink link, and reject other firmwares. Return the state of the flight."""
+        """Poll the MAVLink link, send the battery, and reject other firmwares. Return the state of the flight."""
         link = self._connection
         assert link is not None
-        assert self._vehicle is not None
+        assert self._client is not None
         if self._time >= self._others_at:
             self._others_at = self._time + OTHERS_EVERY
             if link.reject_others():
                 self.report.note(f"a second PX4 tried to connect at t = {self._time:.3f} s")
         self.report.rejected = link.rejected + link.extra_connections
-        result = self._vehicle.poll(self._time, read)
-        self.report.version = self._vehicle.version
-        self._shared.next_poll[0] = max(tick + 1, self._vehicle.next_poll_tick(self._setup.interval))
+        result = poll_flight(NAME, self._client, self._time)
+        if self._own.battery and self._time >= self._battery_at:
+            self._battery_at = self._time + BATTERY_EVERY
+            if math.isfinite((battery := read(ports.BATTERY)).charge):
+                self._client.send_battery(battery.voltage, battery.current, battery.charge)
+        self.report.version = self._client.version
+        self._shared.next_poll[0] = max(tick + 1, self._client.next_poll_tick(self._setup.interval))
         return result
 
     def close(self) -> None:
         """Close the connections and end the program."""
-        if self._vehicle:
-            self._vehicle.close()
+        if self._client:
+            self._client.close()
         if self._connection:
             self._connection.close()
         if self._program:
             self._program.close()
-        self._program = self._connection = self._vehicle = None
+        self._program = self._connection = self._client = None
 
     def _await(self, messages: list[tuple[int, tuple]], time_us: int, waits: Waits) -> None:
         """Wait for the outputs of a time, which may be among `messages`; continue without them after a second."""
@@ -199,8 +209,8 @@ class Px4Link(ProgramLink):
             self._fail("it closed its connection", "see its output")
         self.report.note(f"PX4 closed its connection at t = {self._time:.3f} s")
         self._shared.outputs[:], self._armed[0] = 0.0, False
-        if self._vehicle:
-            self._vehicle.restart()
+        if self._client:
+            self._client.restart()
         self._connect(waits, self._patience(self._setup.start_timeout))
         self.report.reconnected += 1
         self._epoch[0] = self._last_us - round(self._time * 1e6)

@@ -66,7 +66,7 @@ def distance_values(time_us: int, r: DistanceReading) -> tuple:
 class ActuatorControls(NamedTuple):
     """Outputs of PX4."""
 
-    time_us: int  # of PX4's clock
+    time_us: int  # [us] PX4's clock
     lock_step: bool
     armed: bool
     controls: tuple[float, ...]  # 16, motors 0 to 1; all 0 while disarmed

@@ -7,7 +7,7 @@ src/modules/commander/failsafe/framework.cpp and src/lib/events/enums.json; MAVL
 import math
 import struct
 
-from lapwing.services.common.firmware.conventions import Conventions
+from lapwing.services.common.firmware.mission_client import Conventions
 
 AUTOPILOT = 1  # component of an event, in the highest byte of its id
 ACTIONS = (

@@ -40,7 +40,7 @@ class Receiver:
     def __init__(self, setup: SimulatorSetup, client: SimulatorClient, outputs: tuple[Port, ...]):
         """Create the block; `outputs` are the ports of the readings and of the battery."""
         self.name, self.outputs = f"{NAME}.receive", outputs
-        self.time_us = 0  # of the last HIL_SENSOR
+        self.time_us = 0  # [us] time of the last HIL_SENSOR
         self._setup, self._client = setup, client
         self._waits: Waits = lambda text: None
         self._epoch = self._last = -1  # [us]

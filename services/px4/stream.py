@@ -26,7 +26,7 @@ class Stream(NamedTuple):
     received: Any  # bytes
     sequence: Any  # (1,) int64 number of the next frame, 0 to 255
     rest: Any  # (1,) bytes of an incomplete frame, which Python stores
-    addresses: tuple[int, int]  # of sent, received
+    addresses: tuple[int, int]  # addresses of sent, received
     send: int  # addresses of functions
     recv: int
 

@@ -46,7 +46,7 @@ def play(
 
     Raises:
         ValueError: the log cannot be read, has no such topic, or has no message in this part.
-        BusError: the endpoint cannot be listened on.
+        BusError: the bus cannot listen at the endpoint.
     """
     with LogReader(log) as source, ZenohBus([listen]) as bus:
         selected = source.check_topics(topics)

@@ -9,7 +9,7 @@ from lapwing.services.autopilot.land_detector import CUT_HEIGHT
 from lapwing.services.common.ports import Setpoint
 
 _RISING = 0.01  # [m/s]
-LEAST_THRUST = 0.08  # of the maximum, at the lower end of the stick (PX4's MPC_MANTHR_MIN)
+LEAST_THRUST = 0.08  # fraction of the maximum, at the lower end of the stick (PX4's MPC_MANTHR_MIN)
 
 
 def stick_thrust(constants: Constants, up: float) -> float:

@@ -15,9 +15,8 @@ from lapwing.services.autopilot.commander.commander_state import State, initial
 from lapwing.services.autopilot.commander.route import ACTIVE, COMPLETE, NO_MISSION, NOT_STARTED, PAUSED
 from lapwing.services.autopilot.commander.transitions import Context, arm, disarm, enter
 from lapwing.services.autopilot.commander.wakeup_conditions import battery_thresholds, time_without_changes
-from lapwing.services.autopilot.initial_estimate import EXACT
 from lapwing.services.common import status_texts
-from lapwing.services.common.ports import Setpoint
+from lapwing.services.common.ports import Setpoint, StateEstimate
 
 BLOCKED_TIME = 1.0  # [s] without descent at a descending setpoint, after which the vehicle is on the ground
 LOW_THRUST = 0.5  # fraction of the hover thrust below which the vehicle cannot fly
@@ -34,7 +33,7 @@ class Commander:
 
     def initial_status(self) -> Status:
         """Return the status before the first tick."""
-        view = CommanderInput(0.0, EXACT, 0.0, math.nan, 0, None, 0.0, False)
+        view = CommanderInput(0.0, StateEstimate(), 0.0, math.nan, 0, None, 0.0, False)
         return status(self.constants, view, self.state)
 
     def skip(self, ticks: int, dt: float, flying: bool, setpoint: Setpoint | None) -> None:

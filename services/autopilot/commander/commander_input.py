@@ -33,7 +33,7 @@ class CommanderInput(NamedTuple):
     estimate_interval: float  # [s] since the previous one, 0 if it is not new at this tick
     battery_charge: float  # fraction; NaN: unknown
     failed_motor: int  # its number, from 1; 0: none
-    setpoint: Setpoint | None  # of the scene's trajectory; None without one
+    setpoint: Setpoint | None  # setpoint of the scene's trajectory; None without one
     thrust: float  # commanded at the last tick, over the hover thrust
     motors_cut: bool  # by the controller after a landing
     imu_selection: ImuSelection = ImuSelection()  # result of the vote between the IMUs

@@ -37,7 +37,7 @@ class State:
     mode_name: str
     mode: FlightMode | None  # None: the scene's trajectory
     failsafe: str = ""  # reason of the active failsafe
-    failsafe_timers: dict[str, FailsafeTimer] = field(default_factory=dict)  # of active conditions, by reason
+    failsafe_timers: dict[str, FailsafeTimer] = field(default_factory=dict)  # active conditions by reason
     source_outage: list[float] = field(default_factory=lambda: [0.0] * len(SOURCES))  # [s] of lost or rejected sources
     faults: Faults = field(default_factory=Faults)  # injected
     pending_arm: PendingArm | None = None

@@ -4,9 +4,9 @@ from lapwing.kernels import math
 from lapwing.services.autopilot.commander.commander_input import CommanderInput
 from lapwing.services.autopilot.commander.commander_state import State
 from lapwing.services.autopilot.estimator import SOURCES
-from lapwing.services.autopilot.initial_estimate import NOT_STARTED
 from lapwing.services.common import status_texts
 
+NOT_STARTED = 0xFF  # health of the estimate before the filter has started
 MAXIMUM_TILT = 0.35  # [rad] from the vertical
 MAXIMUM_OUTAGE = 0.5  # [s] of a source; single readings may be rejected
 _REQUIREMENTS = {"magnetometer": "SYS_HAS_MAG", "barometer": "SYS_HAS_BARO", "sonar": "SYS_HAS_NUM_DIST"}

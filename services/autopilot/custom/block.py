@@ -51,7 +51,7 @@ class CustomState(NamedTuple):
     held: ControllerOutput  # last output of the user's controller
     failure_detector: motor_failure.State
     still_from: int  # [tick]
-    charge: float  # of the battery, fraction; NaN: unknown
+    charge: float  # charge of the battery, fraction; NaN: unknown
 
 
 def start(p: CustomController) -> CustomState:

@@ -61,8 +61,6 @@ class PythonControllerBlock(PeriodicBlock):
             self._controller = self._controller or self._construct()
             output = parse_controller_output(self._controller.step(time, estimate, setpoint), self._no_voltage)
         except FAULTS as error:
-            raise LockStepError(f"{self._blame(error)} at t = {time:.3f} s") from error
+            cause = blame(error, self._module)
+            raise LockStepError(f"controller {self._code.name}: {cause} at t = {time:.3f} s") from error
         graph.put(CONTROLLER_OUTPUT, tick, output)
-
-    def _blame(self, error: BaseException) -> str:
-        return f"controller {self._code.name}: {blame(error, self._module)}"

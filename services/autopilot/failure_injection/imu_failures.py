@@ -19,7 +19,7 @@ class ImuInjection(NamedTuple):
     """Parameters of the block."""
 
     faults: Any  # cell of `Faults`
-    key: Key  # of random numbers
+    key: Key  # key of the random numbers
     unit: int  # index of the unit
 
 

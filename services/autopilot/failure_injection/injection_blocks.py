@@ -1,13 +1,12 @@
 """Failure injection blocks, direct motor control, and their ports."""
 
-from collections.abc import Callable, Collection
-from functools import partial
+from collections.abc import Collection
 from typing import Any
 
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.compiled_block import Block
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
-from lapwing.dynamics.noise import Key, stream_key
+from lapwing.dynamics.noise import stream_key
 from lapwing.kernels.cell import Cell
 from lapwing.services.autopilot.failure_injection.battery_failures import BatteryInjection
 from lapwing.services.autopilot.failure_injection.failure_state import DELAY, Memory
@@ -17,22 +16,8 @@ from lapwing.services.autopilot.failure_injection.sensor_failures import SensorI
 from lapwing.services.autopilot.motor import Motor
 from lapwing.services.common import ports
 
-
-def _imu(unit: int, faults: Any, key: Key) -> ImuInjection:
-    return ImuInjection(faults, key, unit)
-
-
-_SENSORS: dict[str, Callable[[Any, Key], Any]] = {
-    **{name: partial(_imu, unit) for unit, name in enumerate(ports.IMUS)},
-    ports.MAGNETOMETER: SensorInjection,
-    ports.BAROMETER: SensorInjection,
-    ports.GPS: SensorInjection,
-    ports.SONAR: SensorInjection,
-    ports.RANGEFINDER: SensorInjection,
-    ports.OPTICAL_FLOW: SensorInjection,
-    ports.AIRSPEED: SensorInjection,
-}
-_UNITS = {
+_UNITS: dict[str, tuple[str, ...]] = {  # units of each sensor port; redundant IMUs have those of the first
+    **dict.fromkeys(ports.IMUS, ()),
     ports.IMU: ("gyro", "accelerometer"),
     ports.MAGNETOMETER: ("magnetometer",),
     ports.BAROMETER: ("barometer",),
@@ -54,14 +39,14 @@ class Injection:
         self.released = DirectMotorControl(False, (0.0,) * rotors)  # the controller's command reaches the motors
         self.direct = None if faults is None else Cell(self.released)
         self._setup, self._ports = setup, setup.ports
-        self._sensors = [name for name in _SENSORS if name in read] if faults is not None else []
+        self._sensors = [name for name in _UNITS if name in read] if faults is not None else []
 
     @property
     def units(self) -> tuple[str, ...]:
         """Units that can fail."""
         if self.faults is None:
             return ()
-        return (*[unit for name in self._sensors for unit in _UNITS.get(name, ())], "battery", "motor")
+        return (*[unit for name in self._sensors for unit in _UNITS[name]], "battery", "motor")
 
     def received(self, port: str) -> str:
         """Return the port on which the autopilot receives samples of `port`."""
@@ -82,7 +67,9 @@ class Injection:
             key = stream_key(self._setup.seed, self._setup.vehicle, f"failure.{port}")
             late = sensor_port.period * max(1, round(DELAY / self._setup.interval / sensor_port.period))
             inputs = InputPort(port), InputPort(port, late)
-            parameters = _SENSORS[port](self.faults, key)
+            parameters: Any = SensorInjection(self.faults, key)
+            if port in ports.IMUS:
+                parameters = ImuInjection(self.faults, key, ports.IMUS.index(port))
             blocks.append(
                 Block(f"{name}.inject.{port}", parameters, memory, inputs, (received_port,), sensor_port.period)
             )

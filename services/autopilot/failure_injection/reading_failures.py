@@ -28,7 +28,7 @@ FLOWS, DYNAMICS = 10.0, 1500.0  # [rad/s], [Pa] ranges of garbage, both signs
 class Failure(NamedTuple):
     """Failures of one kind of sensor."""
 
-    field: str  # of `Faults`, with the failure type
+    field: str  # field of `Faults` with the failure type
     wrong: Callable[[Any], Any]  # wrong reading
     garbage: Callable[[Any, Key, int], Any]  # random reading at a tick
 

@@ -18,7 +18,7 @@ class SensorInjection(NamedTuple):
     """Parameters of the block."""
 
     faults: Any  # cell of `Faults`
-    key: Key  # of random numbers
+    key: Key  # key of the random numbers
 
 
 @generic(inline=True)

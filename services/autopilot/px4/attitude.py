@@ -12,7 +12,7 @@ from lapwing.kernels import always_inline, math
 from lapwing.services.autopilot.mixer import clamp
 
 UP = (0.0, 0.0, 1.0)
-OPPOSITE = 1e-5  # of 1 + cosine, below which the shortest rotation has no axis
+OPPOSITE = 1e-5  # 1 + cosine below which the shortest rotation has no axis
 
 
 class Parameters(NamedTuple):

@@ -33,7 +33,7 @@ class Px4State(NamedTuple):
     law: law.State
     failure_detector: motor_failure.State
     still_from: int  # [tick]
-    charge: float  # of the battery, fraction; NaN: unknown
+    charge: float  # charge of the battery, fraction; NaN: unknown
 
 
 def start(p: Px4Controller) -> Px4State:

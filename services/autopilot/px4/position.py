@@ -79,7 +79,7 @@ def thrust_setpoint(p: Parameters, acceleration: Vec3) -> Vec3:
     ax, ay, g = acceleration[0], acceleration[1], p.gravity
     horizontal = math.sqrt(ax * ax + ay * ay)
     slope = min(horizontal / g, math.tan(p.tilt))
-    share = slope / max(horizontal, 1e-9)  # of the horizontal acceleration
+    share = slope / max(horizontal, 1e-9)  # slope per horizontal acceleration [s^2/m]
     upright = 1.0 / math.sqrt(1.0 + slope * slope)
     collective = max(p.hover * (1.0 + acceleration[2] / g) / upright, p.thrust_min)
     z, tx, ty = collective * upright, collective * upright * share * ax, collective * upright * share * ay

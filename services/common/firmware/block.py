@@ -10,6 +10,7 @@ from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port
 from lapwing.services.common.firmware.hold import COMMAND, FirmwareCommand
 from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, Link, Waits
 from lapwing.services.common.firmware.setup import FirmwareSetup
+from lapwing.services.common.text_table import TextTable
 
 NO_MISSION = 1  # MISSION_STATE of MAVLink
 NO_ITEM = 65535
@@ -29,21 +30,9 @@ class StatusText(NamedTuple):
     home: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
-class StatusTextTable:
-    """Growing table of status texts."""
-
-    def __init__(self) -> None:
-        """Create a table whose first entry has empty texts."""
-        self.table: list[StatusText] = [StatusText()]
-        self._indices = {StatusText(): 0}
-
-    def index(self, output: FirmwareOutput) -> int:
-        """Return the index of an output's texts; append them if they are new."""
-        text = StatusText(output.mode, output.text, output.arming_blockers)
-        if text not in self._indices:
-            self._indices[text] = len(self.table)
-            self.table.append(text)
-        return self._indices[text]
+def status_text(output: FirmwareOutput) -> StatusText:
+    """Return the texts of an output."""
+    return StatusText(output.mode, output.text, output.arming_blockers)
 
 
 class FirmwareBlock:
@@ -58,7 +47,7 @@ class FirmwareBlock:
         self._link: Any = create(setup)
         self._zero = FirmwareCommand((0.0,) * len(setup.order))
         self.outputs = (Port(COMMAND, self._zero, LATCHED),)
-        self.status_texts = StatusTextTable()
+        self.status_texts = TextTable([StatusText()])
         self._last_output: FirmwareOutput | None = None
         self._waits: Waits = lambda text: None
         self._opened = False
@@ -113,5 +102,5 @@ class FirmwareBlock:
             at = f"at t = {tick * self._setup.interval:.3f} s"
             raise FirmwareError(f"{self._setup.firmware}: invalid motor outputs {values} {at}; check its motor setup")
         duty = tuple(min(max(values[i], 0.0), 1.0) for i in self._setup.order) if output.armed else self._zero.duty
-        text_id, attitude = self.status_texts.index(output), output.attitude_reference
+        text_id, attitude = self.status_texts.number(status_text(output)), output.attitude_reference
         return FirmwareCommand(duty, output.armed, output.landed, output.finished, text_id, attitude)

@@ -26,7 +26,7 @@ class Datagrams(NamedTuple):
     peer: Any  # (2,) int64: address of the other end; 0: none
     sender: Any  # (2,) int64: address of the sender of the last datagram
     sender_size: Any  # (1,) int64
-    addresses: tuple[int, ...]  # of sent, received, peer, sender, sender_size
+    addresses: tuple[int, ...]  # addresses of sent, received, peer, sender, sender_size
     sendto: int  # addresses of functions
     recvfrom: int
 

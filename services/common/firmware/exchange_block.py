@@ -8,7 +8,7 @@ from lapwing.cosim.diagram.compiled_block import Block, InputRing
 from lapwing.cosim.processes.shared_core import SharedCore
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels.cell import Cell
-from lapwing.services.common.firmware.block import FirmwareBlock
+from lapwing.services.common.firmware.block import FirmwareBlock, status_text
 from lapwing.services.common.firmware.exchange import (
     ARMED,
     FINISHED,
@@ -96,7 +96,7 @@ class ExchangeBlock(FirmwareBlock):
             if output is not None and self._shared:
                 flags: Any = self._shared.flags
                 flags[[ARMED, LANDED, FINISHED]] = output.armed, output.landed, output.finished
-                flags[STATUS_TEXT] = self.status_texts.index(output)
+                flags[STATUS_TEXT] = self.status_texts.number(status_text(output))
         except BaseException as error:  # exceptions do not pass through compiled code; `failure` raises it
             self._error = error
             return 1

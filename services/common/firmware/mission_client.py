@@ -5,17 +5,17 @@ speed of the run. Source: MAVLink guide, "Mission Protocol", "Parameter Protocol
 """
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from enum import Enum, auto
-from typing import Any
+from typing import Any, NamedTuple
 
-from lapwing.services.common.firmware.conventions import Conventions
 from lapwing.services.common.firmware.frame_filter import FrameFilter
+from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput
 from lapwing.services.common.firmware.mavlink_transport import Transport
 from lapwing.services.common.firmware.mission_messages import item_message, result_name
 from lapwing.services.common.firmware.parameter_client import ParameterClient
 from lapwing.services.common.firmware.status_texts import StatusTexts
-from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.common.mavlink.dialect import id_of, mavlink
 from lapwing.services.common.mavlink.frames import saturate
 
 SYSTEM, COMPONENT = 245, mavlink.MAV_COMP_ID_MISSIONPLANNER  # ids of this client
@@ -24,21 +24,18 @@ POLL_EVERY = 0.1  # [s] between two polls
 ROUND_OFF = 1e-6  # [s] by which a poll may be early
 REJECTIONS = 20  # rejected uploads, one per second, after which the flight fails
 CELLS_UNKNOWN, TEMPERATURE_UNKNOWN = 65535, 32767  # in BATTERY_STATUS
-EVENT = 410  # message id; pymavlink has no constant for it
 STOPS = 4  # most messages that one poll asks the firmware to stop
-NEEDED = (  # messages with a handler
-    mavlink.MAVLINK_MSG_ID_HEARTBEAT,
-    mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE,
-    mavlink.MAVLINK_MSG_ID_PARAM_VALUE,
-    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST,
-    mavlink.MAVLINK_MSG_ID_MISSION_REQUEST_INT,
-    mavlink.MAVLINK_MSG_ID_MISSION_ACK,
-    mavlink.MAVLINK_MSG_ID_MISSION_ITEM_REACHED,
-    mavlink.MAVLINK_MSG_ID_COMMAND_ACK,
-    mavlink.MAVLINK_MSG_ID_STATUSTEXT,
-    mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION,
-    EVENT,
-)
+
+
+class Conventions(NamedTuple):
+    """Differences between firmwares on their MAVLink links."""
+
+    mission_mode: tuple[float, float]  # parameters 2 and 3 of MAV_CMD_DO_SET_MODE
+    home_first: bool  # item 0 of a mission is the home position
+    open_value: float  # replaces NaN in the parameters of an item
+    bytewise: bool  # integer parameters keep their bytes in the float field
+    mode_name: Callable[[int], str]  # name of a heartbeat's custom_mode
+    event_text: Callable[[int, bytes], str] = lambda number, arguments: ""  # text of a failsafe's EVENT, "" for others
 
 
 class Stage(Enum):
@@ -267,3 +264,23 @@ class MissionClient:
     def _on_statustext(self, message: Any) -> None:
         text = message.text.rstrip("\0").strip()  # PX4 ends texts that it also sends as events with a tab
         self.texts.add(text, message.severity, self.armed, self.stage is Stage.ARMING)
+
+
+NEEDED = {number for name in vars(MissionClient) if (number := id_of(name.removeprefix("_on_").upper())) is not None}
+"""Messages with a handler `_on_MESSAGE`."""
+
+
+def poll_flight(firmware: str, client: MissionClient, time: float) -> FirmwareOutput:
+    """Poll the client at simulation `time` [s]. Return the state of the flight, without outputs.
+
+    Raises:
+        FirmwareError: the firmware rejects the mission.
+    """
+    client.poll(time)
+    if client.error:
+        raise FirmwareError(f"{firmware}: {client.error} at t = {time:.3f} s; change the mission")
+    failsafe = client.texts.failsafe if client.armed else ""
+    finished = client.stage is Stage.FINISHED
+    return FirmwareOutput(
+        (), client.armed, client.landed, finished, client.mode, failsafe, tuple(client.texts.blockers)
+    )

@@ -15,12 +15,7 @@ class Output(NamedTuple):
     spin: str  # "cw" or "ccw", seen from above
 
 
-QUADROTOR_X = (
-    Output(1.0, -1.0, "ccw"),
-    Output(-1.0, 1.0, "ccw"),
-    Output(1.0, 1.0, "cw"),
-    Output(-1.0, -1.0, "cw"),
-)
+QUADROTOR_X = (Output(1.0, -1.0, "ccw"), Output(-1.0, 1.0, "ccw"), Output(1.0, 1.0, "cw"), Output(-1.0, -1.0, "cw"))
 """Outputs 1 to 4 of PX4 (airframe 10016), ArduPilot (FRAME_CLASS 1, FRAME_TYPE 1) and Betaflight (port 9002).
 
 The last one differs from Betaflight's numbering of motors.

@@ -40,7 +40,7 @@ class FirmwareSetup(NamedTuple):
     interval_ns: int
     period: int  # [ticks] between two exchanges
     status_every: int  # [ticks]
-    phases: tuple[str, ...]  # of the scene's trajectory; empty if the firmware flies a plan
+    phases: tuple[str, ...]  # phases of the scene's trajectory; empty if the firmware flies a plan
     plan: tuple[Any, ...]  # operator commands of `--plan`; a mission_upload has the items
     own: Any  # the adapter's own values
 

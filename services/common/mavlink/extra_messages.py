@@ -16,7 +16,7 @@ _FORMATS |= {"uint64_t": "Q", "float": "f"}
 class _Field(NamedTuple):
     type: str
     name: str
-    length: int  # of an array; 0: a single value
+    length: int  # length of an array; 0: a single value
 
     @property
     def format(self) -> str:

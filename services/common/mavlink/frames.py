@@ -41,14 +41,6 @@ def swap_attitude(q: Quaternion) -> Quaternion:
     return (b, -a, -d, c) if b > 0.0 else (-b, a, d, -c)
 
 
-def euler(q: Quaternion) -> Vec3:
-    """Return roll, pitch, yaw [rad] of a quaternion."""
-    w, x, y, z = q
-    roll = math.atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y))
-    pitch = math.asin(max(-1.0, min(1.0, 2.0 * (w * y - z * x))))
-    return roll, pitch, math.atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z))
-
-
 def from_euler(roll: float, pitch: float, yaw: float) -> Quaternion:
     """Return the quaternion of roll, pitch, yaw [rad]."""
     cr, sr = math.cos(0.5 * roll), math.sin(0.5 * roll)

@@ -1,12 +1,22 @@
 """Emulated autopilot firmware: a module for each, selected by name."""
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol, cast
+from typing import NamedTuple, Protocol, cast
 
 from lapwing.dynamics import discovery
-from lapwing.services.mavlink.mode_entry import FlightMode
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.px4_facts import Fact
 from lapwing.services.mavlink.vehicle_description import VehicleDescription
+
+
+class FlightMode(NamedTuple):
+    """A flight mode that an operator may choose."""
+
+    kind: str  # kind of the command that enters it; also the mode's name in Status
+    name: str  # displayed
+    number: int  # the custom mode
+    standard: int = mavlink.MAV_STANDARD_MODE_NON_STANDARD
+    advanced: bool = True  # ground stations may hide it from beginners
 
 
 class Firmware(Protocol):

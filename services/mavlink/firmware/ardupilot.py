@@ -4,7 +4,7 @@ import math
 from collections.abc import Sequence
 
 from lapwing.services.common.mavlink.dialect import mavlink
-from lapwing.services.mavlink.mode_entry import FlightMode
+from lapwing.services.mavlink.firmware import FlightMode
 from lapwing.services.mavlink.px4_facts import Fact
 from lapwing.services.mavlink.vehicle_description import VehicleDescription
 

@@ -3,7 +3,7 @@
 import struct
 
 from lapwing.services.common.mavlink.dialect import mavlink
-from lapwing.services.mavlink.mode_entry import FlightMode
+from lapwing.services.mavlink.firmware import FlightMode
 from lapwing.services.mavlink.px4_facts import px4_facts
 
 AUTOPILOT = mavlink.MAV_AUTOPILOT_PX4

@@ -10,7 +10,7 @@ from lapwing.services.mavlink.links.receiver import Receiver
 
 ROUND = 64  # pieces of bytes read from one socket before the next socket is read
 PIECE = 2048  # [bytes] longest piece
-MAX_ENDPOINTS = 8  # of a link that listens
+MAX_ENDPOINTS = 8  # limit of a link that listens
 MAX_RATE = 2000.0  # [1/s] pieces that a link reads; more are dropped
 
 

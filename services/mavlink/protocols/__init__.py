@@ -1,11 +1,26 @@
 """Requests of endpoints; each file implements a MAVLink protocol and declares the messages that it handles."""
 
+from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 from lapwing.dynamics import discovery
-from lapwing.services.mavlink.protocols.handler import HANDLERS, Handler
+from lapwing.services.common.mavlink.dialect import id_of
+from lapwing.services.mavlink.session import Session
 
-__all__ = ["Handler", "handlers"]
+Handler = Callable[[Session, Any], None]
+HANDLERS: dict[int, Handler] = {}
+"""Declared handlers by message number."""
+
+
+def handles(*names: str) -> Callable[[Handler], Handler]:
+    """Declare the function that handles these messages."""
+
+    def declare(handler: Handler) -> Handler:
+        HANDLERS.update((number, handler) for number in map(id_of, names) if number is not None)
+        return handler
+
+    return declare
 
 
 @cache

@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.mavlink.geo_coordinates import degrees
-from lapwing.services.mavlink.protocols.handler import handles
+from lapwing.services.mavlink.protocols import handles
 from lapwing.services.mavlink.session import Session
 
 ACCEPTED, DENIED = mavlink.MAV_RESULT_ACCEPTED, mavlink.MAV_RESULT_DENIED

@@ -1,4 +1,4 @@
-"""Flight commands: modes, arming, take-off and landing, positions, missions, speed."""
+"""Flight commands: modes, arming, take-off and landing, positions, missions, speed, restart of the link."""
 
 import math
 from typing import Any
@@ -6,8 +6,18 @@ from typing import Any
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.mavlink.frames import swap_yaw
 from lapwing.services.common.mavlink.geo_coordinates import to_world
-from lapwing.services.mavlink.protocols.commands import ACCEPTED, DENIED, UNSUPPORTED, Command, Outcome, Request, rule
-from lapwing.services.mavlink.protocols.handler import handles
+from lapwing.services.mavlink.protocols import handles
+from lapwing.services.mavlink.protocols.commands import (
+    ACCEPTED,
+    DENIED,
+    RULES,
+    UNSUPPORTED,
+    Command,
+    DeniedError,
+    Outcome,
+    Request,
+    rule,
+)
 from lapwing.services.mavlink.session import Session
 
 
@@ -46,6 +56,7 @@ def do_set_standard_mode(session: Session, c: Command) -> Outcome:
 
 SPEED_AIR, SPEED_GROUND, DEFAULT_SPEED = 0, 1, -2.0  # parameters of DO_CHANGE_SPEED; airspeed is not controlled
 DEFAULT_ORBIT_SPEED = 1.0  # [m/s]
+NOTHING, REBOOT = 0, 1  # action of PREFLIGHT_REBOOT_SHUTDOWN on the autopilot
 FORCED = (21196.0, 2989.0)  # PX4's and ArduPilot's parameter to skip the arming checks
 
 
@@ -67,30 +78,6 @@ def takeoff(session: Session, c: Command) -> Outcome:
         frame = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT
     _, _, height = to_world(datum, frame, math.nan, math.nan, altitude)
     return Request("takeoff", (height, math.nan))
-
-
-@rule(mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_VTOL_LAND)
-def land(session: Session, c: Command) -> Outcome:
-    """Land at the current position."""
-    return Request("land")
-
-
-@rule(mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH)
-def return_(session: Session, c: Command) -> Outcome:
-    """Fly to the home position and land."""
-    return Request("return")
-
-
-@rule(mavlink.MAV_CMD_NAV_LOITER_UNLIM)
-def loiter(session: Session, c: Command) -> Outcome:
-    """Hold the current position."""
-    return Request("hold")
-
-
-@rule(mavlink.MAV_CMD_DO_PAUSE_CONTINUE)
-def pause(session: Session, c: Command) -> Outcome:
-    """Continue the mission if the first parameter is 1; otherwise hold the current position."""
-    return Request("mission", (math.nan,)) if c.params[0] == 1.0 else Request("hold")
 
 
 @rule(mavlink.MAV_CMD_DO_REPOSITION)
@@ -126,12 +113,6 @@ def set_roi(session: Session, c: Command) -> Outcome:
         return Request("roi") if int(c.params[0]) == mavlink.MAV_ROI_NONE else UNSUPPORTED
     x, y, z = to_world(session.vehicle.datum, c.frame, c.latitude, c.longitude, c.altitude)
     return Request("roi", (x, y, z)) if math.isfinite(x) else DENIED
-
-
-@rule(mavlink.MAV_CMD_DO_SET_ROI_NONE)
-def no_roi(session: Session, c: Command) -> Outcome:
-    """Stop pointing the nose at a region of interest."""
-    return Request("roi")
 
 
 @rule(mavlink.MAV_CMD_DO_SET_HOME)
@@ -173,18 +154,6 @@ def turn(session: Session, c: Command) -> Outcome:
     return Request("hold", (swap_yaw(heading),)) if math.isfinite(heading) else DENIED
 
 
-@rule(mavlink.MAV_CMD_MISSION_START)
-def mission_start(session: Session, c: Command) -> Outcome:
-    """Arm and fly the mission from an item."""
-    return Request("mission_start", (c.params[0],))
-
-
-@rule(mavlink.MAV_CMD_DO_SET_MISSION_CURRENT)
-def set_mission_current(session: Session, c: Command) -> Outcome:
-    """Continue with another item."""
-    return Request("mission_current", (c.params[0],)) if c.params[0] >= 0.0 else ACCEPTED
-
-
 @rule(mavlink.MAV_CMD_DO_CHANGE_SPEED)
 def change_speed(session: Session, c: Command) -> Outcome:
     """Fly at another speed over the ground; -1 leaves it unchanged, -2 restores that of the parameter."""
@@ -194,3 +163,32 @@ def change_speed(session: Session, c: Command) -> Outcome:
     if c.params[1] == DEFAULT_SPEED:
         return Request("speed", (math.nan,))
     return Request("speed", (c.params[1],)) if c.params[1] >= 0.0 else ACCEPTED
+
+
+@rule(mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN)
+def reboot(session: Session, c: Command) -> Outcome:
+    """Restart the link, only while disarmed, as in PX4. The autopilot continues: its start is that of the run."""
+    action = int(c.params[0])
+    if action == REBOOT and not session.vehicle.status.armed:
+        session.restart()
+        return ACCEPTED
+    if action == REBOOT:
+        raise DeniedError("Reboot denied: disarm first")
+    return ACCEPTED if action == NOTHING else DENIED
+
+
+# commands without a position or a check
+RULES |= {
+    mavlink.MAV_CMD_NAV_LAND: lambda session, c: Request("land"),
+    mavlink.MAV_CMD_NAV_VTOL_LAND: lambda session, c: Request("land"),
+    mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH: lambda session, c: Request("return"),
+    mavlink.MAV_CMD_NAV_LOITER_UNLIM: lambda session, c: Request("hold"),
+    mavlink.MAV_CMD_DO_PAUSE_CONTINUE: lambda session, c: (
+        Request("mission", (math.nan,)) if c.params[0] == 1.0 else Request("hold")
+    ),
+    mavlink.MAV_CMD_DO_SET_ROI_NONE: lambda session, c: Request("roi"),
+    mavlink.MAV_CMD_MISSION_START: lambda session, c: Request("mission_start", (c.params[0],)),
+    mavlink.MAV_CMD_DO_SET_MISSION_CURRENT: lambda session, c: (
+        Request("mission_current", (c.params[0],)) if c.params[0] >= 0.0 else ACCEPTED
+    ),
+}

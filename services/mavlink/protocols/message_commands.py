@@ -1,8 +1,10 @@
-"""Commands for message intervals and single messages."""
+"""Requests of message intervals, single messages, lost events, and a report of the arming checks."""
 
 import math
+from typing import Any
 
 from lapwing.services.common.mavlink.dialect import mavlink, message_class
+from lapwing.services.mavlink.protocols import handles
 from lapwing.services.mavlink.protocols.commands import ACCEPTED, DENIED, UNSUPPORTED, Command, Outcome, Reply, rule
 from lapwing.services.mavlink.session import Session
 from lapwing.services.mavlink.telemetry import answer_request, streams
@@ -58,3 +60,19 @@ def _reply(session: Session, number: int, parameter: float = 0.0) -> Outcome:
     if messages is None:
         return UNSUPPORTED
     return Reply(messages) if messages else mavlink.MAV_RESULT_TEMPORARILY_REJECTED
+
+
+@handles("REQUEST_EVENT")
+def request_events(session: Session, m: Any) -> None:
+    """Send events again; allowed for every endpoint, like all telemetry."""
+    for message in session.vehicle.events.replies(m.first_sequence, m.last_sequence, session.address):
+        session.send(message)
+
+
+@rule(mavlink.MAV_CMD_RUN_PREARM_CHECKS, changes=False)
+def report(session: Session, c: Command) -> Outcome:
+    """Request a report of the arming checks, which is sent with the next status."""
+    if not session.vehicle.firmware.EVENTS:
+        return UNSUPPORTED
+    session.vehicle.report_requests += 1
+    return ACCEPTED

@@ -5,7 +5,7 @@ from typing import Any
 
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.mavlink.geo_coordinates import degrees, to_world
-from lapwing.services.mavlink.protocols.handler import handles
+from lapwing.services.mavlink.protocols import handles
 from lapwing.services.mavlink.session import Session
 
 GUIDED, GUIDED_ALTITUDE = 2, 3  # "current" of an item that is a guided target, or a guided altitude

@@ -3,7 +3,7 @@
 from typing import Any
 
 from lapwing.services.common.mavlink.dialect import mavlink
-from lapwing.services.mavlink.protocols.handler import handles
+from lapwing.services.mavlink.protocols import handles
 from lapwing.services.mavlink.session import Session
 
 

@@ -14,7 +14,7 @@ from lapwing.services.common.mavlink.geo_coordinates import (
     from_world,
     to_world,
 )
-from lapwing.services.mavlink.protocols.handler import handles
+from lapwing.services.mavlink.protocols import handles
 from lapwing.services.mavlink.session import Session
 
 _AHEAD = {mavlink.MAV_FRAME_BODY_OFFSET_NED, mavlink.MAV_FRAME_BODY_FRD}  # positions from the vehicle, along its axes
@@ -25,7 +25,7 @@ FORCE = mavlink.POSITION_TARGET_TYPEMASK_FORCE_SET
 IGNORE_YAW = mavlink.POSITION_TARGET_TYPEMASK_YAW_IGNORE
 IGNORE_YAW_RATE = mavlink.POSITION_TARGET_TYPEMASK_YAW_RATE_IGNORE
 THRUST_BODY = 1 << 5  # ATTITUDE_TARGET_TYPEMASK_THRUST_BODY_SET, which pymavlink lacks
-CENTRE = 500.0  # of the throttle stick, whose range is 0 to 1000
+CENTRE = 500.0  # centre of the throttle stick, whose range is 0 to 1000
 _GUIDED = ("hold", "goto", "offboard")  # modes that ArduPilot's GUIDED covers
 
 

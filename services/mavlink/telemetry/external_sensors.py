@@ -14,7 +14,7 @@ CENTIMETRE = 0.01
 SONAR_ID, RANGEFINDER_ID = 0, 1
 SEA_LEVEL_DENSITY = 1.225  # [kg/m^3] reference of indicated airspeed
 EIGHTH = 45.0  # [deg] between two of MAV_SENSOR_ROTATION's headings
-QUALITY = 255  # of a measured flow
+QUALITY = 255  # quality of a measured flow
 NO_ROTATION = (0.0, 0.0, 0.0, 0.0)  # for a named orientation
 DOWN = (mavlink.MAV_SENSOR_ROTATION_PITCH_270, NO_ROTATION)
 

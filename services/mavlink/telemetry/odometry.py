@@ -8,7 +8,7 @@ from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
-_DIAGONAL = (0, 6, 11, 15, 18, 20)  # of the upper triangle of a 6 x 6 matrix, row by row
+_DIAGONAL = (0, 6, 11, 15, 18, 20)  # indices in the upper triangle of a 6 x 6 matrix, row by row
 _GOOD, _BAD = 100, -1  # quality [%], -1: failed
 
 

@@ -142,7 +142,7 @@ def _fix(
     velocity: Any,
     spread: tuple[float, float],
     speed_variance: float,
-    dilution: Sequence[int] = (100, 100),  # of precision, in hundredths
+    dilution: Sequence[int] = (100, 100),  # dilutions of precision, in hundredths
     satellites: int | None = None,
 ) -> Any:
     latitude, longitude, altitude = position

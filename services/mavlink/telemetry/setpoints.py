@@ -17,7 +17,7 @@ _RATES_IGNORED = (
     | mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_PITCH_RATE_IGNORE
     | mavlink.ATTITUDE_TARGET_TYPEMASK_BODY_YAW_RATE_IGNORE
 )
-_YAW_BIT = 10  # of the type mask, after three of position, three of velocity, three of acceleration and one of force
+_YAW_BIT = 10  # bit of the type mask, after 3 each of position, velocity, acceleration, and 1 of force
 
 
 def _kinematics(setpoint: Any) -> tuple[int, Vec3, tuple[float, ...]]:

@@ -7,13 +7,12 @@ from typing import Any
 
 from lapwing.messages.topics import ESTIMATE
 from lapwing.services.common.mavlink.dialect import mavlink
-from lapwing.services.mavlink.px4_facts import TYPE
+from lapwing.services.mavlink.px4_facts import TYPE, vehicle_type
 from lapwing.services.mavlink.telemetry.external_sensors import good_airspeed, good_distance, good_flow
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.telemetry.power import power
 from lapwing.services.mavlink.telemetry.sensors import good_baro, good_gps, good_imu, good_mag
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
-from lapwing.services.mavlink.vehicle_type import vehicle_type
 
 NONE = 0xFFFF  # no item of a mission
 MANUAL = ("position_control", "altitude_control", "stabilized", "acro")  # modes flown with the sticks

@@ -27,7 +27,7 @@ class LoadPlant(NamedTuple):
     step: float  # [s]
     steps: int  # per tick
     interval: float  # [s] length of a tick
-    tolerance: float  # of a substep while forces switch, relative to 1 + size
+    tolerance: float  # tolerance of a substep while forces switch, relative to 1 + size
 
 
 class LoadMotion(NamedTuple):

@@ -13,7 +13,7 @@ class FailingMultirotorPlant(NamedTuple):
     """Parameters of the block: the plant before the failures, and the failures."""
 
     core: MultirotorPlant
-    failures: tuple[Failure, ...]  # of this communication step, ascending in time
+    failures: tuple[Failure, ...]  # failures in this communication step, ascending in time
 
 
 @always_inline

@@ -5,27 +5,24 @@ the service's configuration. A scene table of the model is a `SceneTable` in the
 system of `lapwing.dynamics.integrators.RATES`, `system(scene)` returns its parameters and initial state.
 """
 
-import importlib
-import pkgutil
-from functools import cache
 from types import ModuleType
 
 from lapwing.cosim.scene import Scene
+from lapwing.dynamics import discovery
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.common.vehicle_schema import Vehicle
 
 
-@cache
-def names() -> tuple[str, ...]:
+def names() -> list[str]:
     """Return the names of all models: their file names."""
-    return tuple(sorted(m.name for m in pkgutil.iter_modules(__path__) if not m.name.startswith("_")))
+    return discovery.names(__name__)
 
 
 def get(name: str) -> ModuleType:
     """Return the module of a model. Raise ConfigError with the choices if it does not exist."""
     if name not in names():
         raise ConfigError.unknown("vehicle.model", "model", name, names())
-    return importlib.import_module(f"{__name__}.{name}")
+    return discovery.get(__name__, name, "model")
 
 
 def check(scene: Scene) -> None:

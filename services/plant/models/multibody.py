@@ -40,7 +40,7 @@ class Multibody(SceneTable):
     TABLE: ClassVar[str] = "multibody"
     OPTIONAL: ClassVar[bool] = True
     coordinates: Literal["se3", "euler"] = "se3"  # a pose in SE(3) for each body, or positions and Euler angles
-    stabilisation: Literal["projection", "partitioning", "baumgarte", "none"] = "projection"  # of constraints
+    stabilisation: Literal["projection", "partitioning", "baumgarte", "none"] = "projection"  # for constraints
     drive: Literal["torque", "speed"] = "torque"  # motors apply a torque, or prescribe the rotor speed
     event: Annotated[tuple[Event, ...], Field(strict=False)] = ()  # propeller failures in flight
 

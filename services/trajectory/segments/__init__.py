@@ -3,23 +3,15 @@
 To add a kind, add a file with one subclass of `Segment` and a test; scenes refer to it by its `kind`.
 """
 
-import importlib
-import pkgutil
-
 from pydantic import ValidationError
 
+from lapwing.dynamics import discovery
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.validation import fault
 from lapwing.services.trajectory.segments.segment import Segment
 
-
-def _discover() -> dict[str, type[Segment]]:
-    for module in pkgutil.iter_modules(__path__):
-        importlib.import_module(f"{__name__}.{module.name}")
-    return {cls.kind_name(): cls for cls in sorted(Segment.__subclasses__(), key=lambda cls: cls.kind_name())}
-
-
-KINDS = _discover()
+discovery.modules(__name__)
+KINDS = {cls.kind_name(): cls for cls in sorted(Segment.__subclasses__(), key=lambda cls: cls.kind_name())}
 """Segment class by kind."""
 
 

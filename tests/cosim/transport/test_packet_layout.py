@@ -7,8 +7,7 @@ from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.transport.packet_layout import columns, layout
 from lapwing.cosim.transport.packets import StepPacketCodec
 from lapwing.kernels.row_packing import pack_row
-from lapwing.services.autopilot.initial_estimate import EXACT
-from lapwing.services.common.ports import MotorCommand
+from lapwing.services.common.ports import MotorCommand, StateEstimate
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
 
@@ -19,7 +18,7 @@ def test_columns_have_order_of_row():
     assert named["motor_voltage.2"] == 3.0
     assert named["armed"] == 1.0
     assert named["attitude_reference.0"] == 9.0
-    assert columns(EXACT)[3:7] == ["attitude.w", "attitude.x", "attitude.y", "attitude.z"]
+    assert columns(StateEstimate())[3:7] == ["attitude.w", "attitude.x", "attitude.y", "attitude.z"]
 
 
 @pytest.mark.long

@@ -10,7 +10,7 @@ import pytest
 from lapwing.kernels import kernel
 from lapwing.services.ardupilot.frame_sequence import Frame, FrameSequence
 from lapwing.services.ardupilot.servo_packet import decode, throttle
-from lapwing.services.ardupilot.state_message import INVALID, NO_EXTRAS, Extras, VehicleState, write_state
+from lapwing.services.ardupilot.state_message import INVALID, Extras, VehicleState, write_state
 
 
 def packet(count=1, pwm=(1000,) * 16, magic=18458, rate=1200):
@@ -25,6 +25,9 @@ def yawed(yaw):
 @kernel
 def write(out, time, state, extras):
     return write_state(out, time, state, extras)
+
+
+NO_EXTRAS = Extras()
 
 
 def encode(time, state, extras=NO_EXTRAS):

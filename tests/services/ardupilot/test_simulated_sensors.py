@@ -4,9 +4,9 @@ import math
 
 from pymavlink.dialects.v20 import all as mavlink
 
+from lapwing.services.ardupilot.link import SimulatedSensors
 from lapwing.services.ardupilot.modes import CONVENTIONS
 from lapwing.services.ardupilot.resolve import ArduPilotSetup
-from lapwing.services.ardupilot.simulated_sensors import SimulatedSensors
 from lapwing.services.common import ports
 from lapwing.services.common.firmware.mission_client import MissionClient
 from lapwing.services.common.mavlink.geo_coordinates import Datum

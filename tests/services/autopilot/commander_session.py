@@ -5,14 +5,13 @@ import math
 from lapwing.dynamics.lie.quaternion import from_roll_pitch_yaw
 from lapwing.services.autopilot.commander.commander import Commander
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
-from lapwing.services.autopilot.initial_estimate import EXACT
 from lapwing.services.common.autopilot_parameters import table
-from lapwing.services.common.ports import Setpoint
+from lapwing.services.common.ports import Setpoint, StateEstimate
 from lapwing.services.scene_resolver import load
 
 DT = 0.004  # [s]
 CONSTANTS = Constants(table(load("hover")), 0.35, 9.8, 0.4, False, True)
-HIGH = EXACT._replace(position_world=(1.0, 2.0, 5.0))
+HIGH = StateEstimate(position_world=(1.0, 2.0, 5.0))
 """Return an estimate at rest in the air."""
 VIEW = CommanderInput(
     DT, HIGH, 0.0, math.nan, 0, Setpoint((1.0, 2.0, 5.0), (0.0,) * 3, (0.0,) * 3, 0.3, 0.0), 1.0, False
@@ -58,7 +57,7 @@ class Flight(Session):
 
     def _advance(self, commands=()):
         x, y, z = self.setpoint.position_world
-        estimate = EXACT._replace(
+        estimate = StateEstimate(
             position_world=(x, y, max(z, 0.35)),
             velocity_world=self.setpoint.velocity_world,
             attitude=from_roll_pitch_yaw(0.0, 0.0, self.setpoint.yaw),

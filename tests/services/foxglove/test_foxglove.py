@@ -149,7 +149,7 @@ def test_invalid_foxglove_address_is_rejected(text):
 def test_used_address_is_reported():
     with socket.create_server(("127.0.0.1", 0)) as server:
         port = server.getsockname()[1]
-        with pytest.raises(ValueError, match=f"--foxglove 127.0.0.1:{port}: cannot be listened on"):
+        with pytest.raises(ValueError, match=f"--foxglove 127.0.0.1:{port}: cannot listen there"):
             Server(f"127.0.0.1:{port}")
 
 

@@ -311,7 +311,7 @@ def test_port_in_use_is_reported(link):
 
 
 def test_battery_of_scene_is_sent_to_firmware(link):
-    link._setup = link._setup._replace(own=OWN._replace(battery=True))
+    link._own = OWN._replace(battery=True)
     samples = {**SAMPLES, ports.BATTERY: BatteryReading(0.42, 11.2, 20.0)}
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
         vehicle.settimeout(20.0)

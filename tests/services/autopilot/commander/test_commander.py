@@ -9,10 +9,10 @@ from flights import command, item
 
 from lapwing.messages import CommandAck
 from lapwing.services.autopilot.commander.commander import Commander
-from lapwing.services.autopilot.initial_estimate import EXACT
+from lapwing.services.common.ports import StateEstimate
 
 WAITING = CONSTANTS._replace(has_trajectory=False)
-GROUND = EXACT._replace(position_world=(1.0, 2.0, 0.35))
+GROUND = StateEstimate(position_world=(1.0, 2.0, 0.35))
 GPS_LOST = 1 << 1
 
 

@@ -3,8 +3,9 @@
 import pytest
 from commander_session import CONSTANTS, Session
 
+from lapwing.services.autopilot.commander.prearm_checks import NOT_STARTED
 from lapwing.services.autopilot.estimator import SOURCES
-from lapwing.services.autopilot.initial_estimate import EXACT, NOT_STARTED
+from lapwing.services.common.ports import StateEstimate
 
 
 def with_sonar(constants=CONSTANTS):
@@ -17,9 +18,9 @@ def with_sonar(constants=CONSTANTS):
 def blockers_after(bits, seconds, constants=CONSTANTS):
     """Return the arming blockers after a time with these health bits."""
     session = with_sonar(constants)
-    session.step(estimate=EXACT, estimate_interval=0.02)
+    session.step(estimate=StateEstimate(), estimate_interval=0.02)
     for _ in range(round(seconds / 0.02)):
-        request = session.step(estimate=EXACT._replace(health=bits), estimate_interval=0.02)
+        request = session.step(estimate=StateEstimate(health=bits), estimate_interval=0.02)
     return list(request.status.arming_blockers), session.commander.state.source_outage
 
 
@@ -37,7 +38,7 @@ def test_uncertain_estimate_blocks_arming_immediately():
 
 def test_outage_time_counts_only_new_estimates():
     session = Session(CONSTANTS._replace(has_trajectory=False))
-    lost = EXACT._replace(health=1)
+    lost = StateEstimate(health=1)
     for tick in range(1000):
         session.step(estimate=lost, estimate_interval=0.02 if tick % 5 == 0 else 0.0)
     assert session.commander.state.source_outage[0] == pytest.approx(200 * 0.02)
@@ -59,9 +60,9 @@ def test_sensor_blocks_arming_only_if_required(source, parameter):
     for required, blockers in ((1.0, (f"no good readings of the {source}",)), (0.0, ())):
         session.commander.state.guidance.parameters[parameter] = required
         for _ in range(50):
-            request = session.step(estimate=EXACT._replace(health=bits), estimate_interval=0.02)
+            request = session.step(estimate=StateEstimate(health=bits), estimate_interval=0.02)
         assert request.status.arming_blockers == blockers
     for other in set(SOURCES) - {source}:
         for _ in range(50):
-            request = session.step(estimate=EXACT._replace(health=1 << SOURCES.index(other)), estimate_interval=0.02)
+            request = session.step(estimate=StateEstimate(health=1 << SOURCES.index(other)), estimate_interval=0.02)
         assert request.status.arming_blockers == (f"no good readings of the {other}",)

@@ -15,7 +15,7 @@ from lapwing.services.autopilot.commander.wakeup_conditions import (
     battery_thresholds,
     needs_wakeup,
 )
-from lapwing.services.autopilot.initial_estimate import EXACT
+from lapwing.services.common.ports import StateEstimate
 
 pytestmark = pytest.mark.long
 
@@ -84,7 +84,7 @@ def plain(value):
 
 def views(flight, orders=()):
     """Yield each tick's view and True if its estimate is new. Send the commander's output back to the generator."""
-    tick, last_estimate, every_tick = 0, EXACT, False
+    tick, last_estimate, every_tick = 0, StateEstimate(), False
     for ticks, different in flight:
         now = dict(SOUND)
         for each in different if isinstance(different, tuple) else (different,):
@@ -92,7 +92,7 @@ def views(flight, orders=()):
         for _ in range(ticks):
             due = tick % LOOK == 0 or every_tick
             if due:
-                last_estimate = EXACT._replace(
+                last_estimate = StateEstimate(
                     position_world=(float(tick), 0.1 * tick, 5.0 + 0.01 * tick), health=now["health"]
                 )
             view = VIEW._replace(
@@ -198,7 +198,7 @@ def test_nominal_trajectory_flight_needs_no_wakeup():
 
 def test_delay_of_failsafe_limits_validity():
     commander = Commander(constants((1,) * 5, 1.0))
-    lost = VIEW._replace(estimate=EXACT._replace(health=GPS_LOST))
+    lost = VIEW._replace(estimate=StateEstimate(health=GPS_LOST))
     assert not commander.step(lost).valid_for
     assert commander.step(VIEW).valid_for
     requests = [commander.step(lost) for _ in range(round(1.1 / VIEW.dt))]

@@ -9,9 +9,8 @@ from pymavlink.dialects.v20 import all as mavlink
 from lapwing.dynamics.geodesy import Home
 from lapwing.messages import MissionItem, Vector3
 from lapwing.services.ardupilot import modes as ardupilot
-from lapwing.services.common.firmware.flight_status import poll_flight
 from lapwing.services.common.firmware.link import FirmwareError
-from lapwing.services.common.firmware.mission_client import REJECTIONS, MissionClient, Stage
+from lapwing.services.common.firmware.mission_client import REJECTIONS, MissionClient, Stage, poll_flight
 from lapwing.services.common.firmware.mission_messages import mission_messages
 from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.px4 import modes as px4

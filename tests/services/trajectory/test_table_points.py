@@ -5,13 +5,13 @@ from pathlib import Path
 import pytest
 
 from lapwing.cosim.scene import SceneError
-from lapwing.services.trajectory.table_file import parse
+from lapwing.services.trajectory.schema import parse_table
 
 FILE = Path("points.csv")
 
 
 def test_csv_points_are_read():
-    assert parse("time , value\n0,1\n2,5e-1\n", FILE) == [[0.0, 1.0], [2.0, 0.5]]
+    assert parse_table("time , value\n0,1\n2,5e-1\n", FILE) == [[0.0, 1.0], [2.0, 0.5]]
 
 
 @pytest.mark.parametrize(
@@ -29,5 +29,5 @@ def test_csv_points_are_read():
 )
 def test_invalid_csv_is_rejected_with_its_line(text, message):
     with pytest.raises(SceneError) as error:
-        parse(text, FILE)
+        parse_table(text, FILE)
     assert str(error.value).startswith(message)
