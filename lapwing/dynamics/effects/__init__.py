@@ -12,15 +12,11 @@ A user's effect is such a file on Python's path; the scene's table names it with
 import importlib
 from collections.abc import Collection, Iterable, Mapping
 from types import ModuleType
-from typing import TYPE_CHECKING
 
 from lapwing.dynamics import discovery
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.effects._from_scene import validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.environment import STANDARD, Environment
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 __all__ = ["from_scene", "get", "in_evaluation_order", "names", "parameter_class", "validate_table"]
 
@@ -83,7 +79,7 @@ def in_evaluation_order(active: Iterable[str]) -> list[str]:
 
 def from_scene(
     tables: Mapping[str, Mapping],
-    airframe: "Airframe",
+    airframe: Airframe,
     environment: Environment = STANDARD,
     external: Collection[str] = (),
 ) -> tuple:
