@@ -92,7 +92,7 @@ def from_scene(
         external: names of effects whose named inputs an external model computes (see `_external_inputs`).
 
     Raises:
-        KeyedError: of the key `effects.<name>.<key>`, for an unknown effect, a parameter that is missing, unknown, of
+        ConfigError: names the key `effects.<name>.<key>`: an unknown effect, a parameter that is missing, unknown, of
             the wrong type or out of range, an effect that the vehicle cannot have, or two that exclude each other.
     """
     active = []

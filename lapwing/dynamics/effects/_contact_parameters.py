@@ -134,8 +134,11 @@ def _mobility(airframe: Airframe, points: tuple[Vec3, ...]) -> float:
 def _rate_bound(
     airframe: Airframe, feet: tuple[Vec3, ...], stiffness: tuple[float, float], damping: tuple[float, float]
 ) -> float:
-    """Highest natural frequency [rad/s] of the vehicle standing on its springs, or close above it; of a stronger
-    damper the frequency that asks for steps as short. Stiffness and damping: normal, tangential."""
+    """Return a close upper bound of the highest natural frequency [rad/s] of the vehicle on its springs.
+
+    For a stronger damper, it is the frequency that requires equally short steps. Stiffness [N/m] and damping [N s/m] of
+    a foot are (normal, tangential).
+    """
     mass = airframe.mass
     xx, yy, zz = (math.total(foot[i] * foot[i] for foot in feet) for i in range(3))
 

@@ -71,7 +71,7 @@ def _with_and_without(airframe: Airframe) -> tuple[AnyMassProperties, AnyMassPro
 
 
 RELEASED = (1.0,)
-"""Memory of the effect after the release: put it into the plant's state to let the payload go on an event."""
+"""Discrete state after the release: put it into the plant's state to release the payload on an event."""
 
 
 @break_time(PayloadRelease)
@@ -82,8 +82,8 @@ def moment(e, memory, t, h, value):
 
 @timed_update(PayloadRelease)
 def release(e, memory, t):
-    """Let go when the time has come."""
-    return (1.0,) if t >= e.release_time else memory
+    """Release the payload at the release time."""
+    return RELEASED if t >= e.release_time else memory
 
 
 @mass_properties(PayloadRelease)

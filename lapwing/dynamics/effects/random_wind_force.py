@@ -102,6 +102,6 @@ def random_wind_force(e, memory, s, rotors):
 
 
 @wind(RandomWindForce)
-def told(e, memory, before):
+def reported_wind(e, memory, before):
     """Add the wind [m/s] that causes the force to the air."""
     return add(before, memory[1])
