@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lapwing.dynamics.multibody.augmented import ANY, RANK_TOLERANCE, as_float_arrays, refuse_singular, solve
+from lapwing.dynamics.multibody.augmented import ANY, RANK_TOLERANCE, as_float_arrays, raise_if_singular, solve
 from lapwing.dynamics.multibody.body_kinematics import add_increment, configuration_rate, place
 from lapwing.dynamics.multibody.constraints import velocity_defect
 from lapwing.dynamics.multibody.stabilisation import (
@@ -138,7 +138,7 @@ def simulate(
         configuration, velocity, singular = _step(
             a, configuration, velocity, wrench, drive, i * step, step, damping, stiffness, bounds
         )
-        refuse_singular(system, singular, f" at t = {i * step:.6g} s")
+        raise_if_singular(system, singular, f" at t = {i * step:.6g} s")
     return out
 
 
@@ -164,7 +164,7 @@ def check(system, configuration, velocity, drive=None, tolerance=CONSISTENT) -> 
     """Raise ValueError with every violated row and its defect if a state does not satisfy its constraints."""
     configuration, velocity, _, drive = as_float_arrays(system, configuration, velocity, None, drive)
     p, e = rows(system.arrays, configuration, velocity, drive)
-    refuse_singular(system, p.singular)
+    raise_if_singular(system, p.singular)
     names, holonomic = system.row_names(), len(e.residual)
     bad = [f"{names[r]} (position, {e.residual[r]:.3g})" for r in np.flatnonzero(np.abs(e.residual) > tolerance)]
     slip = velocity_defect(e, velocity)
@@ -181,7 +181,7 @@ def consistent(system, configuration, velocity, drive=None):
     """
     configuration, velocity, _, drive = as_float_arrays(system, configuration, velocity, None, drive)
     p, e = rows(system.arrays, configuration, velocity, drive)
-    refuse_singular(system, p.singular)
+    raise_if_singular(system, p.singular)
     if len(e.residual) and np.max(np.abs(e.residual)) > NEAR:
         check(system, configuration, velocity, drive, NEAR)
     configuration, velocity = project(system.arrays, configuration, velocity, drive, (ANY, ANY))
