@@ -24,28 +24,19 @@ if TYPE_CHECKING:
     from lapwing.studies.flight_events import Event
     from lapwing.studies.outcome import FlightOutcome
 
-_WHERE = {
-    "BatchSimulator": "lapwing.batch_simulator",
-    "BatchState": "lapwing.batch_simulator",
-    "Event": "lapwing.studies.flight_events",
-    "Flight": "lapwing.flight",
-    "LockStepError": "lapwing.cosim.run_errors",
-    "Observation": "lapwing.simulator",
-    "Setpoint": "lapwing.services.common.ports",
-    "Scene": "lapwing.cosim.scene",
-    "SceneError": "lapwing.cosim.scene",
-    "Simulator": "lapwing.simulator",
-    "FlightOutcome": "lapwing.studies.outcome",
-    "campaign": "lapwing.api",
-    "choice": "lapwing.studies.campaign.distributions",
-    "fly": "lapwing.api",
-    "linspace": "lapwing.studies.campaign.distributions",
-    "load_scene": "lapwing.api",
-    "loguniform": "lapwing.studies.campaign.distributions",
-    "normal": "lapwing.studies.campaign.distributions",
-    "read_log": "lapwing.api",
-    "uniform": "lapwing.studies.campaign.distributions",
+_NAMES = {
+    "lapwing.api": ("campaign", "fly", "load_scene", "read_log"),
+    "lapwing.batch_simulator": ("BatchSimulator", "BatchState"),
+    "lapwing.cosim.run_errors": ("LockStepError",),
+    "lapwing.cosim.scene": ("Scene", "SceneError"),
+    "lapwing.flight": ("Flight",),
+    "lapwing.services.common.ports": ("Setpoint",),
+    "lapwing.simulator": ("Observation", "Simulator"),
+    "lapwing.studies.campaign.distributions": ("choice", "linspace", "loguniform", "normal", "uniform"),
+    "lapwing.studies.flight_events": ("Event",),
+    "lapwing.studies.outcome": ("FlightOutcome",),
 }
+_WHERE = {name: module for module, names in _NAMES.items() for name in names}
 
 __all__ = [
     "BatchSimulator",

@@ -5,20 +5,12 @@ byte), and the publisher's 16-byte global identifier (GID). A ROS 2 node drops s
 """
 
 import struct
-from typing import NamedTuple
 
 _LAYOUT = struct.Struct("<qqB16s")
 SIZE = _LAYOUT.size
 _GID_SIZE = 16
 _GID_OFFSET = SIZE - _GID_SIZE
-
-
-class Attachment(NamedTuple):
-    """Contents of an attachment."""
-
-    sequence: int  # of this publisher, from 0 or 1 upwards
-    time_ns: int  # simulation time
-    gid: bytes  # 16 bytes that identify the publisher
+_TIME = struct.Struct("<q")
 
 
 def pack(sequence: int, time_ns: int, gid: bytes) -> bytes:
@@ -30,23 +22,6 @@ def pack(sequence: int, time_ns: int, gid: bytes) -> bytes:
     if len(gid) != _GID_SIZE:
         raise ValueError(f"attachment: the publisher's identifier has {len(gid)} bytes, expected {_GID_SIZE}")
     return _LAYOUT.pack(sequence, time_ns, _GID_SIZE, gid)
-
-
-def unpack(data: bytes) -> Attachment:
-    """Return the contents of an attachment.
-
-    Raises:
-        ValueError: not 33 bytes, or the identifier's length is not 16.
-    """
-    if len(data) != SIZE:
-        raise ValueError(f"attachment has {len(data)} bytes, expected {SIZE}")
-    sequence, time_ns, gid_size, gid = _LAYOUT.unpack(data)
-    if gid_size != _GID_SIZE:
-        raise ValueError(f"attachment: the publisher's identifier has length {gid_size}, expected {_GID_SIZE}")
-    return Attachment(sequence, time_ns, gid)
-
-
-_TIME = struct.Struct("<q")
 
 
 def time_and_gid(data: bytes) -> tuple[int, bytes]:

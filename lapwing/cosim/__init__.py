@@ -1,4 +1,4 @@
-"""The co-simulation engine. It knows no service by name; the process table is given to it.
+"""The co-simulation engine. It does not depend on any service: the process table is an argument.
 
 Subpackages, in the order in which a run uses them:
 

@@ -74,7 +74,7 @@ def density(a, altitude):
 
 @always_inline
 def density_slope(a, altitude):
-    """Change of density with altitude [kg/m^4]."""
+    """Return the change of density with altitude [kg/m^4]."""
     lapse = LAPSE_RATE if _geopotential(altitude) < TROPOPAUSE else 0.0
     weaker = EARTH_RADIUS / (EARTH_RADIUS + altitude)
     return density(a, altitude) * (lapse - GRAVITY / GAS_CONSTANT) * weaker * weaker / temperature(a, altitude)

@@ -40,7 +40,7 @@ class ConfigError(ValueError):
 
     @property
     def sentence(self) -> str:
-        """Return the description with the expected values."""
+        """Description with the expected values."""
         if not self.expected:
             return self.message
         if self.message.startswith("got "):

@@ -13,8 +13,7 @@ from numba import types
 from numba.experimental import structref
 
 from lapwing.kernels.native_memory import Layout, Memory, layout
-from lapwing.kernels.tree_flatten import Flattener, leaves
-from lapwing.kernels.type_fingerprint import UnknownError, structure
+from lapwing.kernels.tree_flatten import Flattener, UnknownError, leaves, structure
 
 
 @structref.register

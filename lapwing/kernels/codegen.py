@@ -1,7 +1,7 @@
 """Functions whose source is generated for the types of their arguments: straight-line code instead of tuple loops.
 
 A kernel can neither index a tuple of mixed types by a variable nor select a function by a class. The source of such
-calls is generated at compile time and has no cost at run time. All generated source of `dynamics` is compiled here.
+calls is generated at compile time and has no cost at run time. All generated source is compiled here.
 """
 
 import inspect
@@ -114,18 +114,6 @@ def reduce_tuple(function: Callable, common: Any, value: Any, a: tuple, b: tuple
 def _reduce_tuple(function, common, value, a, b):
     calls = [f"value = function(common, value, a[{i}], b[{i}])" for i in range(len(a))]
     return compile_source("reduce_tuple(function, common, value, a, b)", {}, *calls, "return value")
-
-
-def any_in_tuple(flags: tuple) -> bool:
-    """Return True if any entry of a tuple is true."""
-    return any(flags)
-
-
-@overload_for(any_in_tuple, inline=True)
-def _any_in_tuple(flags):
-    return compile_source(
-        "any_in_tuple(flags)", {}, f"return {' or '.join(f'flags[{i}]' for i in range(len(flags))) or 'False'}"
-    )
 
 
 def map_index(function: Callable, count: tuple, *arguments: Any) -> tuple:

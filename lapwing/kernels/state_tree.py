@@ -37,7 +37,7 @@ class Manifold(NamedTuple):
 
 MANIFOLDS = DispatchTable()
 NUMBERS: list[type] = [types.Float]
-"""Return True if a numba type is a number of a tree."""
+"""Numba types of the numbers of a tree; `simd` adds its vectors."""
 
 
 def _leaf_class(tree: types.Type) -> type | None:

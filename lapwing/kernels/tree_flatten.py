@@ -1,6 +1,7 @@
-"""Generated functions that flatten values of one structure ten times as fast as a recursive walk.
+"""Structures of Python values, and generated functions that flatten values of one structure.
 
-Cells of a flight hold about two thousand numbers, in trees that a campaign creates for every run.
+Equal structures mean equal numba types, and are faster to compute. A generated function is ten times as fast as a
+recursive walk: cells of a flight hold about two thousand numbers, in trees that a campaign creates for every run.
 """
 
 from typing import Any
@@ -8,9 +9,34 @@ from typing import Any
 import numpy as np
 
 from lapwing.kernels.codegen import compile_source
-from lapwing.kernels.type_fingerprint import UnknownError, structure
 
-_BY_TYPE = frozenset({float, bool, type(None), np.float64, np.float32, np.int64, np.int32, np.bool_})
+_PLAIN = frozenset({float, bool, type(None), np.float64, np.float32, np.int64, np.int32, np.bool_})
+LONG = 63  # [bits] numba may give longer integers another type
+
+
+class UnknownError(TypeError):
+    """Error for a value whose type only numba can determine."""
+
+
+def structure(value: Any) -> Any:
+    """Return the hashable structure of a number, an array, a cell, or a tuple or NamedTuple of these.
+
+    Raises:
+        UnknownError: the value has another type.
+    """
+    of = type(value)
+    if of in _PLAIN:
+        return of
+    if isinstance(value, tuple):
+        return of, *map(structure, value)
+    if of is int and value.bit_length() <= LONG:
+        return of
+    if of is np.ndarray:
+        flags = value.flags
+        return of, value.dtype, value.ndim, flags.c_contiguous, flags.f_contiguous, flags.aligned, flags.writeable
+    if hasattr(of, "_numba_box_"):  # a cell
+        return of, value._numba_type_
+    raise UnknownError(of.__name__)
 
 
 def leaves(value: Any) -> list[Any]:
@@ -40,7 +66,7 @@ class Flattener:
         tuples, parts = self._flatten(example)
         self._types = tuple(map(type, tuples)), tuple(map(type, parts))
         # types whose class does not determine their structure
-        self._closer = [(k, structure(part)) for k, part in enumerate(parts) if type(part) not in _BY_TYPE]
+        self._closer = [(k, structure(part)) for k, part in enumerate(parts) if type(part) not in _PLAIN]
 
     def leaves(self, value: Any) -> tuple[Any, ...] | None:
         """Return all numbers, arrays and cells in order; None for a value of another structure."""

@@ -3,7 +3,7 @@
 from numba.core import types
 
 from lapwing.kernels import always_inline, kernel
-from lapwing.kernels.codegen import any_in_tuple, compile_source, generic, map_index, map_tuple, reduce_tuple
+from lapwing.kernels.codegen import compile_source, generic, map_index, map_tuple, reduce_tuple
 
 
 @always_inline
@@ -35,22 +35,6 @@ def test_compiled_code_equals_plain_python():
     x, y = (1.0, 2.0, 3.0), (4.0, 5.0, 6.0)
     assert all_of(x, y) == all_of.py_func(x, y) == ((6.0, 9.0, 12.0), (-3.0, -3.0, -3.0), 1.0, 2.0)
     assert (first.__name__, first.__doc__) == ("first", "Return the first number.")
-
-
-@kernel
-def any_above(x, y):
-    return any_in_tuple(map_tuple(above, 0.0, x, y))
-
-
-@always_inline
-def above(_, x, y):
-    return x > y
-
-
-def test_any_in_tuple_is_true_for_any_true_item():
-    for y, result in (((0.0, 5.0, 4.0), True), ((3.0, 5.0, 4.0), False)):
-        assert any_above((1.0, 2.0, 3.0), y) == any_above.py_func((1.0, 2.0, 3.0), y) == result
-    assert not any_in_tuple(())
 
 
 @always_inline

@@ -3,7 +3,7 @@
 import pytest
 
 from lapwing.kernels import kernel
-from lapwing.kernels.simd_chunks import chunk4, unchunk4
+from lapwing.kernels.simd import chunk4, unchunk4
 
 
 @kernel

@@ -5,8 +5,7 @@ import itertools
 import numpy as np
 
 from lapwing.kernels.cell import Cell
-from lapwing.kernels.tree_flatten import Flattener, leaves
-from lapwing.kernels.type_fingerprint import structure
+from lapwing.kernels.tree_flatten import Flattener, leaves, structure
 from tests.kernels.test_type_fingerprint import VALUES
 
 NESTED = [(a, (b, (), a)) for a, b in itertools.product(VALUES, VALUES)]

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lapwing.kernels.cell import Cell
-from lapwing.kernels.type_fingerprint import UnknownError, structure
+from lapwing.kernels.tree_flatten import UnknownError, structure
 
 
 class Pair(NamedTuple):

@@ -1,6 +1,6 @@
 import pytest
 
-from lapwing.messages.attachment import Attachment, pack, time_and_gid, unpack
+from lapwing.messages.attachment import pack, time_and_gid
 
 GID = bytes(range(16))
 
@@ -11,17 +11,13 @@ def test_layout_byte_by_byte():
 
 
 def test_attachment_round_trips():
-    assert unpack(pack(7, 123456789012, GID)) == Attachment(7, 123456789012, GID)
+    assert time_and_gid(pack(7, 123456789012, GID)) == (123456789012, GID)
     assert time_and_gid(pack(7, -5, GID)) == (-5, GID)
 
 
 def test_invalid_attachment_is_rejected():
     with pytest.raises(ValueError, match="15 bytes, expected 16"):
         pack(0, 0, GID[:15])
-    with pytest.raises(ValueError, match="32 bytes, expected 33"):
-        unpack(pack(0, 0, GID)[:-1])
-    with pytest.raises(ValueError, match="length 17, expected 16"):
-        unpack(bytes(16) + b"\x11" + GID)
     for damaged in (b"", pack(0, 0, GID)[:-1], pack(0, 0, GID) + b"\0", bytes(16) + b"\x11" + GID):
         with pytest.raises(ValueError, match="not an attachment"):
             time_and_gid(damaged)

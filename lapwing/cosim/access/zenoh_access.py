@@ -24,11 +24,13 @@ def by_certificate(key_prefix: str, publishable: Mapping[str, Iterable[str]]) ->
     everything = f"{key_prefix}/**"
     rules = [
         *_reading(everything),
-        _rule("ask", ["query"], "ingress", [f"{key_prefix}/{SETUP_KEY}/*"]),
-        *(_rule(f"say {name}", _PUBLISH, "ingress", keys) for name, keys in publishable.items()),
+        _rule("query", ["query"], "ingress", [f"{key_prefix}/{SETUP_KEY}/*"]),
+        *(_rule(f"publish {name}", _PUBLISH, "ingress", keys) for name, keys in publishable.items()),
     ]
     subjects = [{"id": name, "cert_common_names": [name]} for name in [*publishable, VIEWER]]
-    policies = [{"rules": ["receive", "listen", "ask", f"say {name}"], "subjects": [name]} for name in publishable]
+    policies = [
+        {"rules": ["receive", "listen", "query", f"publish {name}"], "subjects": [name]} for name in publishable
+    ]
     return _settings([*rules, _withheld(key_prefix)], subjects, [*policies, _VIEWING])
 
 

@@ -59,10 +59,10 @@ def find(key: str, name: str, folder: Path) -> dict[str, Path]:
     ahead = [file] if _is_carried(name, file) else []
     while ahead:
         for imported in _imports(ahead.pop()):
-            beside = file.parent / f"{imported}.py"
-            if imported not in result and beside.is_file() and not _is_taken(imported, beside):
-                result[imported] = beside
-                ahead.append(beside)
+            neighbour = file.parent / f"{imported}.py"
+            if imported not in result and neighbour.is_file() and not _is_taken(imported, neighbour):
+                result[imported] = neighbour
+                ahead.append(neighbour)
     return result
 
 
@@ -87,7 +87,7 @@ def _is_carried(name: str, file: Path) -> bool:
 
 
 def _imports(file: Path) -> list[str]:
-    """Return the top-level names that a source imports; an empty set if it is not Python."""
+    """Return the sorted top-level names that a source imports; an empty list if it is not Python."""
     result: set[str] = set()
     with suppress(SyntaxError, ValueError, OSError):
         for node in ast.walk(ast.parse(file.read_bytes())):

@@ -2,7 +2,7 @@
 
 A block is described by its parameters, a NamedTuple. The module of their class has the pure function
 
-    step(parameters, state, tick, inputs) -> (state, outputs, signal)
+    step(parameters, state, tick, inputs) -> (state, outputs, status)
 
 `inputs` is a tuple of `InputSample`, `outputs` a tuple of trees, one for each port. The state is in a cell, which
 blocks of one service may share. Every block is compiled once, to a function of (its memory, tick). Every executor calls
@@ -212,9 +212,9 @@ def run(schedule: Any, tick: int, first: int, stop: int) -> tuple[int, int, int]
     """Run the schedule in a cell from block `first` of `tick` to the tick `stop` (exclusive), or to a Python block.
 
     Returns:
-        (tick, block, status): WAKE_PYTHON: run the Python block at the tick, then continue with the next block;
-        NON_FINITE: the state of the block is non-finite; END: the previous tick was the last; CONTINUE: `stop` is
-        reached.
+        (tick, block, status). WAKE_PYTHON: run the Python block at the tick, then continue with the next block.
+        NON_FINITE: the state of the block is non-finite. FINISHED: the previous tick was the last. CONTINUE: the tick
+        is `stop`.
     """
     plan = schedule.value
     while tick < stop:
@@ -224,14 +224,14 @@ def run(schedule: Any, tick: int, first: int, stop: int) -> tuple[int, int, int]
             if plan.function[k] == 0:
                 return tick, k, WAKE_PYTHON
             plan.next[k] = tick + plan.every[k]
-            signal = _invoke(plan.function[k], plan.memory[k], tick)
-            if signal != CONTINUE:
-                if signal == NON_FINITE:
+            status = _invoke(plan.function[k], plan.memory[k], tick)
+            if status != CONTINUE:
+                if status == NON_FINITE:
                     return tick, k, NON_FINITE
-                if signal == FINISHED:
+                if status == FINISHED:
                     plan.done[plan.vehicle[k]] = 1
                     plan.ended[0] = plan.done.min()
-                elif signal == WAKE_PYTHON:
+                elif status == WAKE_PYTHON:
                     for j in range(k + 1, len(plan.function)):
                         if plan.function[j] == 0 and plan.vehicle[j] == plan.vehicle[k]:
                             plan.next[j] = tick

@@ -55,15 +55,15 @@ class ExecutionGroup:
         """
         k = 0
         while not self.finished:
-            self.tick, k, signal = run(self._cell, self.tick, k, stop)
-            if signal == WAKE_PYTHON:
+            self.tick, k, status = run(self._cell, self.tick, k, stop)
+            if status == WAKE_PYTHON:
                 self._plan.next[k] = max(on_tick(self.parts[k], self.tick), self.tick + 1)
                 k += 1
-            elif signal == NON_FINITE:
+            elif status == NON_FINITE:
                 raise failure(self.parts[k], self.tick)
             else:
-                self.finished = signal == FINISHED
-                if signal == CONTINUE:
+                self.finished = status == FINISHED
+                if status == CONTINUE:
                     return
 
     def run_past_end(

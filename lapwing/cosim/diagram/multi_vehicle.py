@@ -40,18 +40,16 @@ def merge_configs(members: Sequence[RunConfig], resolved: Mapping[str, Any]) -> 
     """
     services = {}
     for name in dict.fromkeys(name for member in members for name in member.services):
-        users = [member for member in members if name in member.services]
-        configs = tuple(member.services[name] for member in users)
-        vehicle_configs = [(member.vehicle, share) for member, share in zip(users, configs, strict=True)]
+        configs = {member.vehicle: member.services[name] for member in members if name in member.services}
         services[name] = ServiceConfig(
-            PerVehicle(tuple(member.vehicle for member in users), configs),
-            tuple(_input(vehicle, i) for vehicle, share in vehicle_configs for i in share.inputs),
-            tuple(_port(vehicle, port) for vehicle, share in vehicle_configs for port in share.ports),
+            PerVehicle(tuple(configs), tuple(configs.values())),
+            tuple(_input(vehicle, i) for vehicle, config in configs.items() for i in config.inputs),
+            tuple(_port(vehicle, port) for vehicle, config in configs.items() for port in config.ports),
         )
     auxiliary = {}
     for name in dict.fromkeys(name for member in members for name in member.auxiliary):
-        users = [member for member in members if name in member.auxiliary]
-        auxiliary[name] = PerVehicle(tuple(m.vehicle for m in users), tuple(m.auxiliary[name] for m in users))
+        values = {member.vehicle: member.auxiliary[name] for member in members if name in member.auxiliary}
+        auxiliary[name] = PerVehicle(tuple(values), tuple(values.values()))
     return members[0]._replace(vehicle="", services=services, auxiliary=auxiliary, resolved=dict(resolved))
 
 

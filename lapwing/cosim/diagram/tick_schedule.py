@@ -36,22 +36,22 @@ def due(tick: int, period: int, delay: int) -> int:
     return stamp if stamp >= 0 and (period <= 1 or stamp % period == 0) else -1
 
 
-def execution_order(needs: Mapping[str, Iterable[InputPort]], gives: Mapping[str, Iterable[str]]) -> list[str]:
+def execution_order(inputs: Mapping[str, Iterable[InputPort]], outputs: Mapping[str, Iterable[str]]) -> list[str]:
     """Return an order in which each participant steps after the producers of its undelayed inputs.
 
     Args:
-        needs: input ports of each participant.
-        gives: names of the output ports of each participant.
+        inputs: input ports of each participant.
+        outputs: names of the output ports of each participant.
 
     Raises:
         LockStepError: there is an algebraic loop, or an input has no producer.
     """
-    producer = {port: name for name, ports in gives.items() for port in ports}
-    for name, inputs in needs.items():
-        for needed in inputs:
+    producer = {port: name for name, ports in outputs.items() for port in ports}
+    for name, own in inputs.items():
+        for needed in own:
             if needed.port not in producer:
                 raise LockStepError(f"{name} needs {needed.port}, which no service of this scene publishes")
-    waiting = {name: {producer[i.port] for i in inputs if i.delay == 0} - {name} for name, inputs in needs.items()}
+    waiting = {name: {producer[i.port] for i in own if i.delay == 0} - {name} for name, own in inputs.items()}
     order: list[str] = []
     while waiting:
         ready = sorted(name for name, before in waiting.items() if before <= set(order))

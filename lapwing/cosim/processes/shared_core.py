@@ -150,7 +150,7 @@ class SharedCore:
         self._next = 0.0  # [s] of the next check
 
     def begin(self, pid: int | None) -> None:
-        """Share a core with a program. Do nothing for None, a program that somebody else has started."""
+        """Share a core with a program. Do nothing for None, a program that the user has started."""
         if pid is None or len(self._initial) < 2 or _affinity(pid) != self._initial:
             return
         allowed = _affinity(0)

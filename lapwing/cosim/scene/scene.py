@@ -100,9 +100,7 @@ class Scene:
         self.path = path  # file of the scene
         self.sources = dict(sources or {})  # contents of all files that were read, by file name: airframe.toml
         self.file_overrides = file_overrides  # overrides of the file; None if the scene has other changes
-        self.vehicles = tuple(
-            vehicles
-        )  # scene of each vehicle if the file lists vehicles; own tables are the shared ones
+        self.vehicles = tuple(vehicles)  # scene of each vehicle of several; own tables are then the shared ones
         self._locate = locate  # returns the key in the file, and the origin of its value
         self._tables = dict(tables)
         self._vocabulary = vocabulary
@@ -188,7 +186,7 @@ class Scene:
 
     @property
     def resolved(self) -> dict[str, Any]:
-        """Return the scene and its files as dicts, lists, texts and numbers; `from_resolved` restores it."""
+        """The scene and its files as dicts, lists, texts and numbers; `from_resolved` restores it."""
         tables: dict[str, Any] = {section.TABLE: table.resolved() for section, table in self._tables.items()}
         if self.vehicles:
             tables["vehicle"] = [

@@ -12,15 +12,11 @@ A user's effect is such a file on Python's path; the scene's table names it with
 import importlib
 from collections.abc import Collection, Iterable, Mapping
 from types import ModuleType
-from typing import TYPE_CHECKING
 
 from lapwing.dynamics import discovery
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.effects._from_scene import validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.environment import STANDARD, Environment
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 __all__ = ["from_scene", "get", "in_evaluation_order", "names", "parameter_class", "validate_table"]
 
@@ -83,7 +79,7 @@ def in_evaluation_order(active: Iterable[str]) -> list[str]:
 
 def from_scene(
     tables: Mapping[str, Mapping],
-    airframe: "Airframe",
+    airframe: Airframe,
     environment: Environment = STANDARD,
     external: Collection[str] = (),
 ) -> tuple:
@@ -96,7 +92,7 @@ def from_scene(
         external: names of effects whose named inputs an external model computes (see `_external_inputs`).
 
     Raises:
-        KeyedError: of the key `effects.<name>.<key>`, for an unknown effect, a parameter that is missing, unknown, of
+        ConfigError: names the key `effects.<name>.<key>`: an unknown effect, a parameter that is missing, unknown, of
             the wrong type or out of range, an effect that the vehicle cannot have, or two that exclude each other.
     """
     active = []

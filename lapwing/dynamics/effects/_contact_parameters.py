@@ -1,18 +1,15 @@
 """Scene table and parameters of the ground contact, with stick-slip or regularised friction."""
 
-from typing import TYPE_CHECKING, Annotated, Any, Literal, NamedTuple
+from typing import Annotated, Any, Literal, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.effects._from_scene import reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.terrain import LEVEL, upright
 from lapwing.dynamics.vector import ZERO, Vec3
 from lapwing.kernels import math
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 Coefficient = Annotated[float, Ge(0), Le(5)]
 Stiffness = Annotated[float, Gt(0), Le(1e9)]
@@ -57,7 +54,7 @@ class GroundContact(NamedTuple):
     rate_bound: float  # [1/s] of the fastest mode in contact
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "GroundContact | GroundContactSmooth":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "GroundContact | GroundContactSmooth":
         """Return the parameters with the airframe's feet and mass."""
         settings = validate_table(Settings, table)
         if settings.friction_dynamic > settings.friction_static:
@@ -128,17 +125,20 @@ def _reach(feet: tuple[Vec3, ...], terrain: Any = LEVEL) -> float:
     return max(math.hypot(*foot) for foot in feet) * math.hypot(*upright(terrain))
 
 
-def _mobility(airframe: "Airframe", points: tuple[Vec3, ...]) -> float:
+def _mobility(airframe: Airframe, points: tuple[Vec3, ...]) -> float:
     inertia = airframe.mass.inertia
     arm = max(point[0] * point[0] + point[1] * point[1] + point[2] * point[2] for point in points)
     return 1.0 / airframe.mass.total + arm / min(inertia)
 
 
 def _rate_bound(
-    airframe: "Airframe", feet: tuple[Vec3, ...], stiffness: tuple[float, float], damping: tuple[float, float]
+    airframe: Airframe, feet: tuple[Vec3, ...], stiffness: tuple[float, float], damping: tuple[float, float]
 ) -> float:
-    """Highest natural frequency [rad/s] of the vehicle standing on its springs, or close above it; of a stronger
-    damper the frequency that asks for steps as short. Stiffness and damping: normal, tangential."""
+    """Return a close upper bound of the highest natural frequency [rad/s] of the vehicle on its springs.
+
+    For a stronger damper, it is the frequency that requires equally short steps. Stiffness [N/m] and damping [N s/m] of
+    a foot are (normal, tangential).
+    """
     mass = airframe.mass
     xx, yy, zz = (math.total(foot[i] * foot[i] for foot in feet) for i in range(3))
 

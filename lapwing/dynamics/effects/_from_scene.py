@@ -5,9 +5,18 @@ from functools import cache
 from typing import TYPE_CHECKING, Any, NoReturn, TypeVar
 
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.vehicles.propeller import hover_flow
+from lapwing.kernels import math
 
-if TYPE_CHECKING:  # services do not import pydantic
+if TYPE_CHECKING:
     from pydantic import TypeAdapter
+
+    from lapwing.dynamics.vehicles.airframe import Airframe
+    from lapwing.dynamics.vehicles.airframe_tables import Propeller
+else:
+    Airframe = Any  # services do not import pydantic
+
+__all__ = ["Airframe", "check_beside", "pitch_and_flow", "reject", "validate_table"]
 
 T = TypeVar("T")
 
@@ -47,6 +56,14 @@ def _tuples(value: Any) -> Any:
 def reject(reason: str) -> NoReturn:
     """Reject an effect that the vehicle cannot have."""
     raise ConfigError("", reason)
+
+
+def pitch_and_flow(propeller: "Propeller") -> tuple[float, float]:
+    """Return (blade pitch [m/rad], induced velocity in hover over the rotor speed [m/rad]); reject pitch <= flow."""
+    pitch, flow = propeller.pitch / (2.0 * math.pi), hover_flow(propeller)
+    if flow >= pitch:
+        reject(f"the propeller's pitch must be above {2.0 * math.pi * flow:.3g} m for its static thrust")
+    return pitch, flow
 
 
 def check_beside(tables: Mapping[str, Any], needed: str, excluded: Iterable[str]) -> None:

@@ -1,16 +1,13 @@
 """Air density as a function of altitude."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from lapwing.dynamics.atmosphere import Atmosphere, density, density_slope
-from lapwing.dynamics.effects._from_scene import validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.effects._hooks import air, discrete_update
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.environment import Environment
 from lapwing.kernels import always_inline, python_function
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 
 class Settings(NamedTuple):
@@ -28,7 +25,7 @@ class AirDensity(NamedTuple):
     home_altitude: float = 0.0  # [m] of the world frame's origin above the sea
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "AirDensity":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "AirDensity":
         """Return the standard atmosphere at sea level."""
         validate_table(Settings, table)
         return cls()

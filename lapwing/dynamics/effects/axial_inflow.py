@@ -1,18 +1,15 @@
 """Effect of axial air speed on thrust and torque of the rotors."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from lapwing.dynamics.effects._axes import axial_speeds
-from lapwing.dynamics.effects._from_scene import reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
 from lapwing.dynamics.effects._hooks import loads, switches
 from lapwing.dynamics.effects._types import Loads
 from lapwing.dynamics.vector import pair, product
-from lapwing.dynamics.vehicles.propeller import drag_coefficients, thrust_coefficient, torque_coefficient
+from lapwing.dynamics.vehicles.propeller import drag_coefficients, thrust_constant, torque_coefficient
 from lapwing.kernels import always_inline, math
 from lapwing.kernels.codegen import map_tuple, reduce_tuple
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 KIND = "flow through the rotors"
 LIMIT = 0.5  # of the rotor's speed, to which the axial speed counts
@@ -37,7 +34,7 @@ class AxialInflow(NamedTuple):
     turn_per_metre: float  # [rad/m] 2 pi over pitch
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "AxialInflow":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "AxialInflow":
         """Return the parameters of the airframe's propeller."""
         validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
@@ -46,7 +43,7 @@ class AxialInflow(NamedTuple):
         profile, induced = drag_coefficients(propeller)
         square = math.square(2.0 * math.pi)
         return cls(
-            thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / square,
+            thrust_constant(propeller),
             torque_coefficient(propeller) * induced / (profile + induced) * math.pow(propeller.diameter, 5) / square,
             2.0 * math.pi / propeller.pitch,
         )

@@ -1,18 +1,15 @@
 """Battery with state of charge and voltage sag."""
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.effects._external_inputs import external, initial_state, input_or
-from lapwing.dynamics.effects._from_scene import reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
 from lapwing.dynamics.effects._hooks import battery_state, discrete_update, supply_voltage
 from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.kernels import always_inline, math, python_function
 from lapwing.kernels.codegen import map_tuple
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 KIND = "battery model"
 
@@ -39,7 +36,7 @@ class Battery(NamedTuple):
     cutoff_voltage: float  # [V] of all cells
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "Battery":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "Battery":
         """Return the parameters of the airframe's battery."""
         settings = validate_table(Settings, table)
         pack = airframe.battery or reject("the vehicle has no [battery]")

@@ -1,22 +1,19 @@
 """Battery with transient voltages and temperature; the motors restart when its voltage recovers."""
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.atmosphere import temperature as air_temperature
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._external_inputs import external, initial_state, input_or
-from lapwing.dynamics.effects._from_scene import reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
 from lapwing.dynamics.effects._hooks import battery_state, discrete_update, supply_voltage
 from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.dynamics.effects.battery import KIND, BatteryInputs, at_most, open_circuit_voltage
 from lapwing.dynamics.environment import Environment
 from lapwing.kernels import math
 from lapwing.kernels.codegen import map_tuple
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 __all__ = ["KIND", "BatteryThevenin", "Settings"]
 
@@ -72,7 +69,7 @@ class BatteryThevenin(NamedTuple):
     given_temperature: bool = False  # True if the scene defines the initial temperature
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "BatteryThevenin":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "BatteryThevenin":
         """Return the parameters of the airframe's battery."""
         settings = validate_table(Settings, table)
         pack = airframe.battery or reject("the vehicle has no [battery]")

@@ -1,15 +1,12 @@
 """Air drag of the fuselage."""
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
-from lapwing.dynamics.effects._from_scene import reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
 from lapwing.dynamics.effects._hooks import wrench_body
 from lapwing.dynamics.vector import NOTHING, Vec3, apply_transposed, multiply, norm, scale, subtract
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 Coefficient = Annotated[float, Ge(0), Le(100)]
 Triple = tuple[Coefficient, Coefficient, Coefficient]
@@ -33,7 +30,7 @@ class BodyDrag(NamedTuple):
     linear: Vec3  # [N s/m]
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "BodyDrag":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "BodyDrag":
         """Return the parameters with the airframe's areas, unless the table has others."""
         settings = validate_table(Settings, table)
         area = settings.area

@@ -1,15 +1,12 @@
 """Constant force and torque in body axes."""
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
-from lapwing.dynamics.effects._from_scene import validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.effects._hooks import wrench_body
 from lapwing.dynamics.vector import Vec3
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 Force = Annotated[float, Ge(-1e4), Le(1e4)]
 Torque = Annotated[float, Ge(-1e4), Le(1e4)]
@@ -34,7 +31,7 @@ class BodyWrench(NamedTuple):
     torque: Vec3  # [N m]
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "BodyWrench":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "BodyWrench":
         """Take both from the scene's table."""
         settings = validate_table(Settings, table)
         return cls(settings.force, settings.torque)

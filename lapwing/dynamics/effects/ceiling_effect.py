@@ -1,19 +1,16 @@
 """Thrust increase below a ceiling."""
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from lapwing.dynamics.effects._from_scene import reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, pitch_and_flow, reject, validate_table
 from lapwing.dynamics.effects._hooks import is_sleeping, load_factors
 from lapwing.dynamics.effects._types import Factors
-from lapwing.dynamics.vector import norm, pair
-from lapwing.dynamics.vehicles.propeller import thrust_coefficient, torque_coefficient
+from lapwing.dynamics.vector import first, norm, pair, product, second
+from lapwing.dynamics.vehicles.propeller import thrust_constant, torque_constant
 from lapwing.kernels import always_inline, math, noinline
 from lapwing.kernels.codegen import map_tuple
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 LOWEST = 0.25  # radii: lower limit of the distance in the law
 FADE_FROM, FADE_TO = 4.0, 8.0  # radii over which the remaining effect, below 0.2 %, is faded out
@@ -50,16 +47,12 @@ class CeilingEffect(NamedTuple):
     reach: float  # [m] distance of the centre of mass from the ceiling within which it has an effect
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "CeilingEffect":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "CeilingEffect":
         """Return the parameters of the airframe's propeller."""
         settings = validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
-        radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
-        static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
-        torque = torque_coefficient(propeller) * math.pow(propeller.diameter, 5) / math.square(2.0 * math.pi)
-        flow = math.sqrt(0.5 * static / (math.pi * radius * radius))
-        if flow >= pitch:
-            reject(f"the propeller's pitch must be above {2.0 * math.pi * flow:.3g} m for its static thrust")
+        radius, (pitch, flow) = 0.5 * propeller.diameter, pitch_and_flow(propeller)
+        static, torque = thrust_constant(propeller), torque_constant(propeller)
         length, width = settings.size or (UNBOUNDED, UNBOUNDED)
         reach = FADE_TO * radius + max(math.hypot(*place) for place in airframe.rotors.position)
         return cls(
@@ -101,23 +94,12 @@ def _rotor_factors(c, plan, z):
     return root * root, 1.0 + e.induced * (root * root * root / gamma - 1.0)
 
 
-@always_inline
-def _times_first(_, factor, change):
-    return factor * change[0]
-
-
-@always_inline
-def _times_second(_, factor, change):
-    return factor * change[1]
-
-
 @load_factors(CeilingEffect)
 def ceiling_effect(e, memory, s, before):
     """Multiply the thrust and torque factors."""
     change = map_tuple(_rotor_factors, (e, s), map_tuple(pair, 0.0, s.layout.x_body, s.layout.y_body), s.layout.z_body)
-    return Factors(
-        map_tuple(_times_first, 0.0, before.thrust, change), map_tuple(_times_second, 0.0, before.torque, change)
-    )
+    thrust, torque = map_tuple(first, 0.0, change, change), map_tuple(second, 0.0, change, change)
+    return Factors(map_tuple(product, 0.0, before.thrust, thrust), map_tuple(product, 0.0, before.torque, torque))
 
 
 @is_sleeping(CeilingEffect)

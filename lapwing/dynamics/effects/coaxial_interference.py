@@ -1,23 +1,21 @@
 """Thrust loss of a rotor in the wake of a rotor above it."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from lapwing.dynamics import small_matrices
 from lapwing.dynamics.effects._axes import hub_speeds
-from lapwing.dynamics.effects._from_scene import check_beside, reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, check_beside, pitch_and_flow, reject, validate_table
 from lapwing.dynamics.effects._hooks import loads
-from lapwing.dynamics.effects._types import Loads, PerRotor, WakeSlopes
+from lapwing.dynamics.effects._rotor_sums import with_changes
+from lapwing.dynamics.effects._types import PerRotor, WakeSlopes
 from lapwing.dynamics.vector import pair
 from lapwing.dynamics.vehicles import inflow
-from lapwing.dynamics.vehicles.propeller import thrust_coefficient
+from lapwing.dynamics.vehicles.propeller import thrust_constant
 from lapwing.kernels import always_inline, math, python_function
 from lapwing.kernels.codegen import map_tuple
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 CONTRACTED = math.sqrt(0.5)  # radius of the wake over the radius of the disc
 ASIDE = 1.0 - CONTRACTED  # [radii] largest distance of the axes at which the entire wake meets the lower disc
@@ -47,21 +45,20 @@ class CoaxialInterference(NamedTuple):
     distance: PerRotor  # [m] from each rotor to the rotor above it, along the axis
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "CoaxialInterference":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "CoaxialInterference":
         """Return the parameters of all rotors below another rotor."""
         validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
-        radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
+        radius = 0.5 * propeller.diameter
         uppers = _uppers(airframe, radius)
         if all(number < 0 for number, _ in uppers):
             limits = f"{FARTHEST * radius:.3g} m below another with axes at most {ASIDE * radius:.3g} m apart"
             reject(f"the vehicle has no coaxial rotors; expected a rotor at most {limits}")
-        static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
-        flow = math.sqrt(0.5 * static / (math.pi * radius * radius))
-        if flow >= pitch:
-            reject(f"the propeller's pitch must be above {2.0 * math.pi * flow:.3g} m for its static thrust")
+        pitch, flow = pitch_and_flow(propeller)
         above = tuple(tuple(float(number == j) for j in range(len(uppers))) for number, _ in uppers)
-        return cls(static, pitch / flow, flow, radius, above, tuple(distance for _, distance in uppers))
+        return cls(
+            thrust_constant(propeller), pitch / flow, flow, radius, above, tuple(distance for _, distance in uppers)
+        )
 
     def changes(self, speed: float, axial: float = 0.0, across: float = 0.0) -> list[tuple[float, float]]:
         """Return the change of (thrust [N], torque [N m]) of each rotor at a density of 1, all rotors at one speed.
@@ -100,17 +97,17 @@ def check(table: Mapping[str, Any], tables: Mapping[str, Any]) -> None:
     check_beside(tables, "rotor_thrust", NOT_BESIDE)
 
 
-def has_rotor_in_wake(airframe: "Airframe") -> bool:
+def has_rotor_in_wake(airframe: Airframe) -> bool:
     """Return True if a rotor lies in the wake of another one."""
     propeller = airframe.propeller
     return propeller is not None and any(number >= 0 for number, _ in _uppers(airframe, 0.5 * propeller.diameter))
 
 
-def _uppers(airframe: "Airframe", radius: float) -> list[tuple[int, float]]:
+def _uppers(airframe: Airframe, radius: float) -> list[tuple[int, float]]:
     return [_upper(airframe, k, radius) for k in range(len(airframe.rotors.position))]
 
 
-def _upper(airframe: "Airframe", k: int, radius: float) -> tuple[int, float]:
+def _upper(airframe: Airframe, k: int, radius: float) -> tuple[int, float]:
     """Return (index, distance [m]) of the nearest rotor whose wake reaches rotor k; (-1, 0) if none does."""
     places = np.array(airframe.rotors.position)
     axes = np.array(airframe.rotors.tilted_axis or [(0.0, 0.0, 1.0)] * len(places))
@@ -159,22 +156,6 @@ def _change(e, both, place):
     return static * (thrust - 1.0), static * e.flow * (thrust * through - 1.0)
 
 
-@always_inline
-def _more(density, before, both):
-    factor, change = both
-    return before + density * factor * change
-
-
-@always_inline
-def _first(_, change, factor):
-    return factor, change[0]
-
-
-@always_inline
-def _second(_, change, factor):
-    return factor, change[1]
-
-
 @loads(CoaxialInterference)
 def coaxial_interference(e, memory, s, factors, before):
     """Add the loads of each rotor to `before`."""
@@ -182,7 +163,4 @@ def coaxial_interference(e, memory, s, factors, before):
     squares = map_tuple(_square, 0.0, speed, factors.thrust)
     wash = map_tuple(_flow, (e.flow, squares), e.above, e.above)
     change = map_tuple(_change, e, map_tuple(pair, 0.0, speed, wash), map_tuple(pair, 0.0, hub_speeds(s), e.distance))
-    thrust, torque = map_tuple(_first, 0.0, change, factors.thrust), map_tuple(_second, 0.0, change, factors.torque)
-    return Loads(
-        map_tuple(_more, s.air.density, before.thrust, thrust), map_tuple(_more, s.air.density, before.torque, torque)
-    )
+    return with_changes(s, factors, before, change)

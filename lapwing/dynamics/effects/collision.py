@@ -1,10 +1,10 @@
 """Collisions between vehicles of a fleet."""
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from lapwing.dynamics.effects._from_scene import reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
 from lapwing.dynamics.effects._hooks import wrench
 from lapwing.dynamics.effects._vehicle_interaction import interaction
 from lapwing.dynamics.vector import (
@@ -21,9 +21,6 @@ from lapwing.dynamics.vector import (
     subtract,
 )
 from lapwing.kernels import always_inline, math
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 PUSH = 0.05  # share of the penetration that is corrected in each communication step
 
@@ -50,7 +47,7 @@ class Collision(NamedTuple):
     friction: float
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "Collision":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "Collision":
         """Return the parameters with a sphere around the rotors, unless the table has its own."""
         settings = validate_table(Settings, table)
         radius = settings.radius

@@ -1,13 +1,13 @@
 """Direct-current motors with an electrical model, instead of a first-order lag of the rotor speed."""
 
 import math
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
 from lapwing.dynamics.effects._axes import by_axis
 from lapwing.dynamics.effects._external_motor import FULL_FRICTION, DcMotorInputs, ExternalDcMotor, idle_current
-from lapwing.dynamics.effects._from_scene import validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.effects._hooks import discrete_update, motor, switches
 from lapwing.dynamics.effects._motor_winding import (
     NONE,
@@ -18,9 +18,6 @@ from lapwing.dynamics.effects._motor_winding import (
 from lapwing.dynamics.vector import first, pair, second
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple, reduce_tuple
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 KIND = "motor model"
 
@@ -57,7 +54,7 @@ class DcMotor(NamedTuple):
     rotors: int = 0  # of the vehicle
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "DcMotor":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "DcMotor":
         """Return the parameters of the airframe's motor."""
         settings = validate_table(Settings, table)
         engine = airframe.motor

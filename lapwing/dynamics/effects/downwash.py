@@ -1,18 +1,15 @@
 """Downwash of the vehicles of a fleet on vehicles below."""
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
-from lapwing.dynamics.effects._from_scene import reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
 from lapwing.dynamics.effects._hooks import air
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.effects._vehicle_interaction import interaction
 from lapwing.dynamics.vector import ZERO, add, dot, norm, scale, subtract
 from lapwing.kernels import math
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 
 class Settings(NamedTuple):
@@ -40,7 +37,7 @@ class Downwash(NamedTuple):
     core: float  # [m] distance before the jet spreads
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "Downwash":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "Downwash":
         """Return the parameters with the discs of the airframe's propellers."""
         settings = validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")

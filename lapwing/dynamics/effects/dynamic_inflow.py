@@ -1,20 +1,17 @@
 """Rotors with the induced velocity as a state: climb, descent, and translational lift."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from lapwing.dynamics.effects._axes import hub_speeds
-from lapwing.dynamics.effects._from_scene import reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
 from lapwing.dynamics.effects._hooks import discrete_update, loads, switches
 from lapwing.dynamics.effects._rotor_sums import with_changes
 from lapwing.dynamics.effects.axial_inflow import KIND, SUDDEN, fastest_spin
 from lapwing.dynamics.vector import pair
 from lapwing.dynamics.vehicles import inflow
-from lapwing.dynamics.vehicles.propeller import thrust_coefficient
+from lapwing.dynamics.vehicles.propeller import hover_flow, thrust_constant
 from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.codegen import map_tuple, reduce_tuple
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 __all__ = ["KIND", "DynamicInflow", "Settings"]
 
@@ -48,15 +45,14 @@ class DynamicInflow(NamedTuple):
     at_rest: tuple[float, ...]  # [m/s] a zero for each rotor
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "DynamicInflow":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "DynamicInflow":
         """Return the parameters of the airframe's propeller."""
         validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
-        static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
-        area = math.pi * radius * radius
+        static, area = thrust_constant(propeller), math.pi * radius * radius
         kappa = propeller.induced_power_factor
-        hover = kappa * math.sqrt(0.5 * static / area)
+        hover = kappa * hover_flow(propeller)
         if hover > LARGEST_SHARE * pitch:
             least = 2.0 * math.pi * hover / LARGEST_SHARE
             reject(

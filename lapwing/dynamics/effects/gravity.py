@@ -1,14 +1,11 @@
 """Constant gravity."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from lapwing.dynamics.effects._from_scene import validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.effects._hooks import field, wrench
 from lapwing.dynamics.environment import STANDARD_GRAVITY, Environment
 from lapwing.dynamics.vector import NOTHING
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 KIND = "gravity"
 
@@ -27,7 +24,7 @@ class Gravity(NamedTuple):
     acceleration: float = STANDARD_GRAVITY  # [m/s^2]
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "Gravity":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "Gravity":
         """Return the standard acceleration."""
         validate_table(Settings, table)
         return cls()

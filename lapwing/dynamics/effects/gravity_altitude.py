@@ -1,16 +1,13 @@
 """Gravity as a function of altitude."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from lapwing.dynamics.atmosphere import EARTH_RADIUS
-from lapwing.dynamics.effects._from_scene import validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.effects._hooks import discrete_update, field, wrench
 from lapwing.dynamics.environment import STANDARD_GRAVITY, Environment
 from lapwing.dynamics.vector import NOTHING
 from lapwing.kernels import always_inline
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 KIND = "gravity"
 
@@ -30,7 +27,7 @@ class GravityAltitude(NamedTuple):
     home_altitude: float = 0.0  # [m] of the world frame's origin above the sea
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "GravityAltitude":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "GravityAltitude":
         """Return the standard acceleration at sea level."""
         validate_table(Settings, table)
         return cls()

@@ -24,8 +24,7 @@ from lapwing.dynamics.terrain import over_plane, summit, surface
 from lapwing.dynamics.vector import ZERO, add, apply, apply_transposed, cross, dot, scale, subtract
 from lapwing.kernels import always_inline, kernel
 from lapwing.kernels.codegen import generic, map_tuple, reduce_tuple
-from lapwing.kernels.simd import any_above, deinterleave, interleave, select, select_vector, sqrt
-from lapwing.kernels.simd_chunks import chunk4, unchunk4
+from lapwing.kernels.simd import any_above, chunk4, deinterleave, interleave, select, select_vector, sqrt, unchunk4
 from lapwing.kernels.state_tree import largest
 
 RELAXED = 1e-13  # [m] deflection of friction elements that counts as zero

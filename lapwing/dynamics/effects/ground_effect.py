@@ -1,17 +1,14 @@
 """Ground effect of single rotors."""
 
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
-from lapwing.dynamics.effects._from_scene import reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
 from lapwing.dynamics.effects._hooks import is_sleeping, load_factors
 from lapwing.dynamics.effects._types import Factors
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.terrain import LEVEL, over_plane, summit, surface, upright
 from lapwing.kernels import always_inline, math
 from lapwing.kernels.codegen import map_tuple
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 KIND = "ground effect model"
 LOWEST = 0.5  # radii: lower limit of the height in the law
@@ -34,7 +31,7 @@ class GroundEffect(NamedTuple):
     terrain: Any = LEVEL  # Level or Relief
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "GroundEffect":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "GroundEffect":
         """Return the parameters of the airframe's propeller."""
         validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")

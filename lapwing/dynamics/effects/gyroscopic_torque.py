@@ -1,17 +1,14 @@
 """Gyroscopic torque of the rotors on the rotating body."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 from lapwing.dynamics.effects._axes import by_axis
-from lapwing.dynamics.effects._from_scene import validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.effects._hooks import torque
 from lapwing.dynamics.effects._rotor_sums import total, total_vector
 from lapwing.dynamics.vector import cross, product, scale, subtract
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 
 class Settings(NamedTuple):
@@ -28,7 +25,7 @@ class GyroscopicTorque(NamedTuple):
     inertia: float  # [kg m^2] of one rotor about its axis
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "GyroscopicTorque":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "GyroscopicTorque":
         """Return the parameters of the airframe's rotors."""
         validate_table(Settings, table)
         return cls(airframe.rotors.inertia)

@@ -1,20 +1,17 @@
 """H-force: drag of the rotors in their plane."""
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
 from lapwing.dynamics.effects._axes import air_body, by_axis, places
-from lapwing.dynamics.effects._from_scene import reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
 from lapwing.dynamics.effects._hooks import wrench_body
 from lapwing.dynamics.effects._rotor_sums import total, total_wrench
 from lapwing.dynamics.vector import add, cross, dot, pair, product, scale, subtract
 from lapwing.dynamics.vehicles.propeller import h_force_coefficient
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 
 class Settings(NamedTuple):
@@ -37,7 +34,7 @@ class HForce(NamedTuple):
     square_arm: tuple[float, ...]  # [m^2] squared distance of each rotor from the body z axis
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "HForce":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "HForce":
         """Return the parameters of the airframe's propeller, unless the table has the coefficient."""
         settings = validate_table(Settings, table)
         positions = airframe.rotors.position

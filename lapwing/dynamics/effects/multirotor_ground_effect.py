@@ -1,23 +1,20 @@
 """Ground effect of all rotors together, also over a part of their area."""
 
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from annotated_types import Ge, Le
 
 from lapwing.dynamics.effects._axes import hub_speeds
-from lapwing.dynamics.effects._from_scene import reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
 from lapwing.dynamics.effects._hooks import is_sleeping, load_factors
 from lapwing.dynamics.effects._types import Factors
 from lapwing.dynamics.effects.ground_effect import KIND
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.terrain import LEVEL, Level, over_plane, summit, surface, upright
 from lapwing.dynamics.vector import pair
-from lapwing.dynamics.vehicles.propeller import thrust_coefficient
+from lapwing.dynamics.vehicles.propeller import hover_flow
 from lapwing.kernels import always_inline, math, noinline
 from lapwing.kernels.codegen import map_tuple
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 __all__ = ["KIND", "MultirotorGroundEffect", "Settings"]
 
@@ -60,19 +57,17 @@ class MultirotorGroundEffect(NamedTuple):
     terrain: Any = LEVEL  # Level or Relief
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "MultirotorGroundEffect":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "MultirotorGroundEffect":
         """Return the parameters of the airframe's propellers over level ground."""
         settings = validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
         radius, places = 0.5 * propeller.diameter, airframe.rotors.position
-        static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
-        flow = math.sqrt(0.5 * static / (math.pi * radius * radius))
         share = 1.0 / (len(places) - 1)
         pairs = tuple(tuple((_square(a, b), 0.0 if a is b else share) for b in places) for a in places)
         diagonal = max(square for row in pairs for square, _ in row)
         reach = max(math.hypot(*place) for place in places)
         fountain = 2.0 * radius * radius * settings.fountain
-        return cls(radius, LOWEST * radius, flow, fountain, diagonal, pairs, FADE_TO * radius + reach)
+        return cls(radius, LOWEST * radius, hover_flow(propeller), fountain, diagonal, pairs, FADE_TO * radius + reach)
 
     def in_environment(self, environment: Environment) -> "MultirotorGroundEffect":
         """Return the effect over the scene's terrain."""

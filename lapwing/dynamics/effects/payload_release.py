@@ -1,17 +1,14 @@
 """Payload that is released in flight."""
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 import numpy as np
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.effects._from_scene import reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
 from lapwing.dynamics.effects._hooks import break_time, mass_properties, timed_update
 from lapwing.dynamics.effects._types import AnyMassProperties, body_of, offset_body, principal_moments, steiner
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 Length = Annotated[float, Gt(0), Le(10)]
 
@@ -38,7 +35,7 @@ class PayloadRelease(NamedTuple):
     empty: AnyMassProperties
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "PayloadRelease":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "PayloadRelease":
         """Return mass properties with and without the box."""
         settings = validate_table(Settings, table)
         release = float("inf") if settings.release_time is None else settings.release_time
@@ -63,7 +60,7 @@ class PayloadRelease(NamedTuple):
         return (0.0,)
 
 
-def _with_and_without(airframe: "Airframe") -> tuple[AnyMassProperties, AnyMassProperties]:
+def _with_and_without(airframe: Airframe) -> tuple[AnyMassProperties, AnyMassProperties]:
     """Return mass properties of the loaded vehicle, about its centre of mass, and of the vehicle without the box."""
     joint, box = airframe.mass, airframe.payload
     assert box is not None
@@ -74,7 +71,7 @@ def _with_and_without(airframe: "Airframe") -> tuple[AnyMassProperties, AnyMassP
 
 
 RELEASED = (1.0,)
-"""Memory of the effect after the release: put it into the plant's state to let the payload go on an event."""
+"""Discrete state after the release: put it into the plant's state to release the payload on an event."""
 
 
 @break_time(PayloadRelease)
@@ -85,8 +82,8 @@ def moment(e, memory, t, h, value):
 
 @timed_update(PayloadRelease)
 def release(e, memory, t):
-    """Let go when the time has come."""
-    return (1.0,) if t >= e.release_time else memory
+    """Release the payload at the release time."""
+    return RELEASED if t >= e.release_time else memory
 
 
 @mass_properties(PayloadRelease)

@@ -3,19 +3,16 @@
 import math
 import zlib
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.effects._from_scene import validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.effects._hooks import discrete_update, wind, wrench
 from lapwing.dynamics.noise import normal3
 from lapwing.dynamics.vector import NOTHING, ZERO, Vec3, add, norm, scale, subtract
 from lapwing.kernels import always_inline
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 Speed = Annotated[float, Ge(-60), Le(60)]
 
@@ -52,7 +49,7 @@ class RandomWindForce(NamedTuple):
     interval: float  # [s] between two draws
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "RandomWindForce":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "RandomWindForce":
         """Return the parameters of a scene's table."""
         settings = validate_table(Settings, table)
         return cls(
@@ -105,6 +102,6 @@ def random_wind_force(e, memory, s, rotors):
 
 
 @wind(RandomWindForce)
-def told(e, memory, before):
+def reported_wind(e, memory, before):
     """Add the wind [m/s] that causes the force to the air."""
     return add(before, memory[1])

@@ -1,15 +1,12 @@
 """Aerodynamic damping of the vehicle's rotation."""
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
-from lapwing.dynamics.effects._from_scene import validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.effects._hooks import torque
 from lapwing.dynamics.vector import Vec3, multiply, scale, subtract
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 Coefficient = Annotated[float, Ge(0), Le(1e3)]
 
@@ -31,7 +28,7 @@ class RotationalDrag(NamedTuple):
     linear: Vec3  # [N m s/rad]
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotationalDrag":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "RotationalDrag":
         """Take the coefficients from the scene's table."""
         return cls(validate_table(Settings, table).linear)
 

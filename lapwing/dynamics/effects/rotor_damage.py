@@ -1,18 +1,15 @@
 """Propeller damage or loss in flight."""
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.effects._from_scene import validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.effects._hooks import break_time, load_factors, timed_update
 from lapwing.dynamics.effects._types import Factors, PerRotor
 from lapwing.dynamics.vector import product
 from lapwing.kernels.codegen import map_tuple
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 
 class Settings(NamedTuple):
@@ -36,7 +33,7 @@ class RotorDamage(NamedTuple):
     remaining_torque: tuple[float, ...]
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorDamage":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "RotorDamage":
         """Return the parameters for one of the airframe's rotors."""
         settings = validate_table(Settings, table)
         count = len(airframe.rotors.position)

@@ -1,21 +1,18 @@
 """Blade flapping: rotor discs tilt away from a transverse wind."""
 
 import math
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
 from lapwing.dynamics.effects._axes import air_body, by_axis, places
-from lapwing.dynamics.effects._from_scene import reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
 from lapwing.dynamics.effects._hooks import wrench_body
 from lapwing.dynamics.effects._rotor_sums import total_wrench
 from lapwing.dynamics.vector import add, cross, dot, norm, pair, scale, subtract
 from lapwing.dynamics.vehicles.propeller import thrust_coefficient
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 FASTEST = 0.5  # advance ratio above which the tilt grows no more
 SLOWEST = 1.0  # [rad/s] below which the tilt is that of this rotor speed
@@ -41,7 +38,7 @@ class RotorFlapping(NamedTuple):
     inverse_radius: float  # [1/m]
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorFlapping":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "RotorFlapping":
         """Return the parameters of the airframe's propeller."""
         settings = validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")

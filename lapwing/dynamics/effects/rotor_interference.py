@@ -1,23 +1,20 @@
 """Interference of neighbouring rotors in forward flight."""
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from lapwing.dynamics.effects._axes import air_body, hub_speeds
-from lapwing.dynamics.effects._from_scene import check_beside, reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, check_beside, pitch_and_flow, reject, validate_table
 from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._rotor_sums import with_changes
 from lapwing.dynamics.effects._vortex_wake import OFFSETS, SKEWS, mean_wash
 from lapwing.dynamics.vector import pair
 from lapwing.dynamics.vehicles import inflow
-from lapwing.dynamics.vehicles.propeller import thrust_coefficient
+from lapwing.dynamics.vehicles.propeller import thrust_constant
 from lapwing.kernels import always_inline, kernel, math, noinline
 from lapwing.kernels.codegen import map_tuple
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 NEAREST = 0.5  # radii between axes; nearer rotors are coaxial
 SAME = 1e-6  # [m] tolerance within which distances share a table
@@ -48,16 +45,12 @@ class RotorInterference(NamedTuple):
     wash: np.ndarray  # mean flow at a disc over that at the inducing one, shape (tables, skews, offsets)
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorInterference":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "RotorInterference":
         """Return the parameters of every pair of rotors."""
         validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
-        radius, pitch = 0.5 * propeller.diameter, propeller.pitch / (2.0 * math.pi)
-        static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
-        area = math.pi * radius * radius
-        flow = math.sqrt(0.5 * static / area)
-        if flow >= pitch:
-            reject(f"the propeller's pitch must be above {2.0 * math.pi * flow:.3g} m for its static thrust")
+        radius, (pitch, flow) = 0.5 * propeller.diameter, pitch_and_flow(propeller)
+        static, area = thrust_constant(propeller), math.pi * radius * radius
         places = airframe.rotors.position
         distances: list[float] = []
         pairs = []

@@ -3,14 +3,14 @@
 import itertools
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._axes import hub_speeds
-from lapwing.dynamics.effects._from_scene import reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
 from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._propeller_data import parse_table
 from lapwing.dynamics.effects._types import Loads
@@ -18,9 +18,6 @@ from lapwing.dynamics.input_file import read_text
 from lapwing.dynamics.vector import pair
 from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.codegen import map_tuple
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 INSTEAD_OF = ("rotor_thrust", "rotor_quadratic", "axial_inflow", "dynamic_inflow")
 WIDEST = 0.25  # of J between two rows
@@ -59,7 +56,7 @@ class RotorTable(NamedTuple):
     torque_constant: float  # [m^5/rad^2] at rest in the air
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorTable":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "RotorTable":
         """Return the parameters of the table, with the airframe's diameter."""
         settings = validate_table(Settings, table)
         diameter = settings.diameter

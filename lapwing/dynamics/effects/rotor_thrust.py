@@ -1,16 +1,13 @@
 """Static thrust and torque of the rotors from the propeller's geometry."""
 
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
-from lapwing.dynamics.effects._from_scene import reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
 from lapwing.dynamics.effects._hooks import loads
 from lapwing.dynamics.effects._types import Loads
-from lapwing.dynamics.vehicles.propeller import thrust_coefficient, torque_coefficient
-from lapwing.kernels import always_inline, math
+from lapwing.dynamics.vehicles.propeller import thrust_constant, torque_constant
+from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 KIND = "rotor thrust model"
 
@@ -30,15 +27,11 @@ class RotorThrust(NamedTuple):
     torque_constant: float  # [m^5/rad^2] C_M D^5 / (4 pi^2)
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "RotorThrust":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "RotorThrust":
         """Return the parameters of the airframe's propeller."""
         validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]; use rotor_quadratic")
-        square = math.square(2.0 * math.pi)
-        return cls(
-            thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / square,
-            torque_coefficient(propeller) * math.pow(propeller.diameter, 5) / square,
-        )
+        return cls(thrust_constant(propeller), torque_constant(propeller))
 
 
 @always_inline

@@ -1,10 +1,10 @@
 """Load carried by several vehicles of a fleet with cables."""
 
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le, Lt
 
-from lapwing.dynamics.effects._from_scene import validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.effects._hooks import switches, wrench
 from lapwing.dynamics.effects._vehicle_interaction import interaction
 from lapwing.dynamics.environment import Environment
@@ -12,9 +12,6 @@ from lapwing.dynamics.terrain import LEVEL
 from lapwing.dynamics.vector import NOTHING, ZERO, Vec3, add, scale, subtract
 from lapwing.dynamics.vehicles.multirotor_slung import Sling, SlungMotion, cable, cable_slackens
 from lapwing.kernels import always_inline, math
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 Offset = Annotated[float, Ge(-100), Le(100)]
 
@@ -41,7 +38,7 @@ class SharedSlungLoad(NamedTuple):
     sling: Sling
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "SharedSlungLoad":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "SharedSlungLoad":
         """Return the parameters with the damping for the airframe's mass."""
         settings = validate_table(Settings, table)
         reduced = 1.0 / (1.0 / settings.mass + 1.0 / airframe.mass.total)

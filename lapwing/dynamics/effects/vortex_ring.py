@@ -1,22 +1,19 @@
 """Vortex ring state: loss and fluctuation of the thrust in descent."""
 
 import zlib
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
 from lapwing.dynamics.effects._axes import hub_speeds
-from lapwing.dynamics.effects._from_scene import reject, validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
 from lapwing.dynamics.effects._hooks import discrete_update, load_factors
 from lapwing.dynamics.effects._types import Factors
 from lapwing.dynamics.noise import normal3
 from lapwing.dynamics.vector import pair, product
-from lapwing.dynamics.vehicles.propeller import thrust_coefficient
+from lapwing.dynamics.vehicles.propeller import hover_flow
 from lapwing.kernels import always_inline, math
 from lapwing.kernels.codegen import map_tuple
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 LANE = zlib.crc32(b"vortex_ring")
 # descent over the induced velocity in hover where the ring begins, is strongest, and ends (windmill brake state)
@@ -53,15 +50,13 @@ class VortexRing(NamedTuple):
     calm: tuple[tuple[float, float], ...]  # zeros for each rotor
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "VortexRing":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "VortexRing":
         """Return the parameters of the airframe's propeller."""
         settings = validate_table(Settings, table)
         propeller = airframe.propeller or reject("the vehicle has no [propeller]")
-        radius, count = 0.5 * propeller.diameter, len(airframe.rotors.position)
-        static = thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
-        flow = math.sqrt(0.5 * static / (math.pi * radius * radius))
+        count = len(airframe.rotors.position)
         lanes = tuple(LANE + k for k in range(count))
-        return cls(flow, settings.loss, settings.unsteadiness, lanes, ((0.0, 0.0),) * count)
+        return cls(hover_flow(propeller), settings.loss, settings.unsteadiness, lanes, ((0.0, 0.0),) * count)
 
     def initial_discrete_state(self) -> tuple[tuple[float, float], ...]:
         """Return the oscillation of each rotor, in phase and in quadrature; its stationary deviation is 1."""

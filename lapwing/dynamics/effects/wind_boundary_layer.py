@@ -1,18 +1,15 @@
 """Wind that increases with height above the ground."""
 
-from typing import TYPE_CHECKING, Annotated, Any, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
-from lapwing.dynamics.effects._from_scene import validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.effects._hooks import air
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.terrain import LEVEL, surface
 from lapwing.kernels import math
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 
 class Settings(NamedTuple):
@@ -36,7 +33,7 @@ class WindBoundaryLayer(NamedTuple):
     terrain: Any = LEVEL  # Level or Relief
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "WindBoundaryLayer":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "WindBoundaryLayer":
         """Return the parameters over level ground."""
         settings = validate_table(Settings, table)
         scale = settings.speed / math.log1p(settings.height / settings.roughness)

@@ -1,15 +1,13 @@
 """Dryden turbulence at low altitude."""
 
 import zlib
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
+from lapwing.dynamics.effects._from_scene import Airframe
 from lapwing.dynamics.effects._hooks import air, discrete_update
 from lapwing.dynamics.effects._turbulence import KIND, Conditions, Part, Settings, add_to_air, calm, conditions, drawn
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.vector import Vec3
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 __all__ = ["KIND", "Settings", "WindDryden"]
 
@@ -29,7 +27,7 @@ class WindDryden(NamedTuple):
     parts: tuple[Part, ...] = PARTS
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "WindDryden":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "WindDryden":
         """Return the parameters over level ground."""
         return cls(conditions(table))
 

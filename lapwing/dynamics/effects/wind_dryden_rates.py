@@ -1,12 +1,12 @@
 """Dryden turbulence at low altitude with angular gusts."""
 
 import zlib
-from typing import TYPE_CHECKING, Annotated, NamedTuple
+from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.effects import wind_dryden
-from lapwing.dynamics.effects._from_scene import validate_table
+from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.effects._hooks import air, air_rate, discrete_update
 from lapwing.dynamics.effects._turbulence import (
     KIND,
@@ -26,9 +26,6 @@ from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.noise import normal3
 from lapwing.dynamics.vector import ZERO, Vec3, add, apply_transposed, scale
 from lapwing.kernels import always_inline, math
-
-if TYPE_CHECKING:  # services do not import pydantic
-    from lapwing.dynamics.vehicles.airframe import Airframe
 
 __all__ = ["KIND", "Settings", "WindDrydenRates"]
 
@@ -60,7 +57,7 @@ class WindDrydenRates(NamedTuple):
     span: float  # [m]
 
     @classmethod
-    def from_scene(cls, table: dict, airframe: "Airframe") -> "WindDrydenRates":
+    def from_scene(cls, table: dict, airframe: Airframe) -> "WindDrydenRates":
         """Return the parameters over level ground; the default span is from tip to tip of the outer rotors."""
         span = validate_table(Settings, table).span
         if span is None:

@@ -41,12 +41,6 @@ def log(g):
 
 
 @always_inline
-def compose(g, h):
-    """Return the product g h: first h, then g."""
-    return Pose(add(g[0], rotate(g[1], h[0])), quaternion.multiply(g[1], h[1]))
-
-
-@always_inline
 def adjoint(g, u):
     """Return Ad_g u, with g exp(u) = exp(Ad_g u) g (theory.md, eq. (5.17))."""
     rotation = rotate(g[1], u[1])

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.lie.ratios import cosine_ratio, cotangent_ratio, cubic_ratio, sine_ratio
-from lapwing.dynamics.vector import add, apply, cross, dot, matmul, scale, transpose
+from lapwing.dynamics.vector import add, cross, dot, matmul, scale, transpose
 from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import MANIFOLDS, Manifold
 
@@ -98,12 +98,6 @@ def _polish(m):
 def normalise(m):
     """Return the rotation matrix nearest to m, for m within 0.1 of one."""
     return Rotation(*_polish(_polish(_polish(_polish(m)))))
-
-
-@always_inline
-def adjoint(m, v):
-    """Return Ad of a rotation matrix on so(3): the rotated vector."""
-    return apply(m, v)
 
 
 @always_inline

@@ -186,7 +186,7 @@ def accelerations(
     """
     configuration, velocity, wrench, drive = as_float_arrays(system, configuration, velocity, wrench, drive)
     solution, singular = solve(system.arrays, configuration, velocity, wrench, drive, 0.0, 0.0, RANK_TOLERANCE, ANY)
-    refuse_singular(system, singular)
+    raise_if_singular(system, singular)
     return solution
 
 
@@ -223,7 +223,7 @@ def as_float_arrays(
     return configuration, velocity, wrench, drive
 
 
-def refuse_singular(system: System, body: int, when: str = "") -> None:
+def raise_if_singular(system: System, body: int, when: str = "") -> None:
     """Raise ValueError if `body` is not -1: its Euler angles are singular."""
     if body >= 0:
         raise ValueError(

@@ -202,9 +202,8 @@ def machine(
     drive: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
     speeds: Sequence[float] = (0.0, 0.0, 0.0, 0.0),
     wrenches: Sequence[Wrench] = (NO_WRENCH,) * 5,
-    feedback: float = 0.0,
 ) -> Machine:
-    """Return the five bodies of a drone.
+    """Return the five bodies of a drone, without Baumgarte's feedback.
 
     Args:
         drone: mass properties.
@@ -212,7 +211,6 @@ def machine(
         drive: torque from the chassis [N m] of a spinning propeller, otherwise imposed acceleration [rad/s^2].
         speeds: imposed speeds relative to the chassis at t = 0 [rad/s].
         wrenches: external wrench on each body, chassis first.
-        feedback: Baumgarte's rate [1/s]; 0: none.
     """
     rotors = tuple(
         Rotor(
@@ -221,7 +219,7 @@ def machine(
         )
         for k in range(4)
     )  # fmt: skip
-    return Machine(drone.mass, drone.inertia, gravity, wrenches[0], rotors, feedback)
+    return Machine(drone.mass, drone.inertia, gravity, wrenches[0], rotors, 0.0)
 
 
 def arrays(x: FiveBodies) -> tuple[np.ndarray, np.ndarray]:

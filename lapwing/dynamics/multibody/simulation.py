@@ -1,4 +1,4 @@
-"""Motion of a general system in time: the classical Runge-Kutta method on the index-1 equations, and a stabilisation.
+"""Initial states and motion of a general system: the classical Runge-Kutta method on the index-1 equations.
 
 The state is an array of any number of bodies in either coordinates, so it does not use the state trees of
 `lapwing.dynamics.integrators`, which the five bodies on the fast path use (see `five_bodies`).
@@ -8,8 +8,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lapwing.dynamics.multibody.augmented import RANK_TOLERANCE, as_float_arrays, refuse_singular, solve
+from lapwing.dynamics.multibody.augmented import ANY, RANK_TOLERANCE, as_float_arrays, raise_if_singular, solve
 from lapwing.dynamics.multibody.body_kinematics import add_increment, configuration_rate, place
+from lapwing.dynamics.multibody.constraints import velocity_defect
 from lapwing.dynamics.multibody.stabilisation import (
     BAUMGARTE,
     NAMES,
@@ -19,8 +20,12 @@ from lapwing.dynamics.multibody.stabilisation import (
     partition,
     project,
     ranks,
+    rows,
 )
 from lapwing.kernels import kernel
+
+CONSISTENT = 1e-9  # [m, -, m/s, rad/s] largest defect of a consistent state
+NEAR = 0.2  # largest position defect that is corrected: beyond it, another assembly of the mechanism may be found
 
 
 class Recorded(NamedTuple):
@@ -133,7 +138,7 @@ def simulate(
         configuration, velocity, singular = _step(
             a, configuration, velocity, wrench, drive, i * step, step, damping, stiffness, bounds
         )
-        refuse_singular(system, singular, f" at t = {i * step:.6g} s")
+        raise_if_singular(system, singular, f" at t = {i * step:.6g} s")
     return out
 
 
@@ -153,3 +158,32 @@ def _energy(a, q, v):
 def energy(system, configuration, velocity) -> tuple[float, float]:
     """Return (kinetic, potential) energy [J]; the potential is zero with all centres of mass at the origin."""
     return _energy(system.arrays, np.asarray(configuration, float), np.asarray(velocity, float))
+
+
+def check(system, configuration, velocity, drive=None, tolerance=CONSISTENT) -> None:
+    """Raise ValueError with every violated row and its defect if a state does not satisfy its constraints."""
+    configuration, velocity, _, drive = as_float_arrays(system, configuration, velocity, None, drive)
+    p, e = rows(system.arrays, configuration, velocity, drive)
+    raise_if_singular(system, p.singular)
+    names, holonomic = system.row_names(), len(e.residual)
+    bad = [f"{names[r]} (position, {e.residual[r]:.3g})" for r in np.flatnonzero(np.abs(e.residual) > tolerance)]
+    slip = velocity_defect(e, velocity)
+    bad += [f"{names[r]} (velocity, {slip[r]:.3g})" for r in np.flatnonzero(np.abs(slip) > tolerance)]
+    if bad:
+        raise ValueError(f"initial state violates {len(bad)} of {holonomic + len(slip)} conditions: {'; '.join(bad)}")
+
+
+def consistent(system, configuration, velocity, drive=None):
+    """Return the nearest consistent (configuration, velocity) in the metric of the masses.
+
+    Raises:
+        ValueError: a joint is apart by more than `NEAR`, or no state satisfies all rows; names the violated rows.
+    """
+    configuration, velocity, _, drive = as_float_arrays(system, configuration, velocity, None, drive)
+    p, e = rows(system.arrays, configuration, velocity, drive)
+    raise_if_singular(system, p.singular)
+    if len(e.residual) and np.max(np.abs(e.residual)) > NEAR:
+        check(system, configuration, velocity, drive, NEAR)
+    configuration, velocity = project(system.arrays, configuration, velocity, drive, (ANY, ANY))
+    check(system, configuration, velocity, drive)
+    return configuration, velocity

@@ -70,7 +70,7 @@ class Airframe(Section):
 
     @property
     def loaded(self) -> "Airframe":
-        """Return the airframe with the box of [payload] included in its mass (theory.md, eq. (2.41))."""
+        """Airframe with the box of [payload] included in its mass (theory.md, eq. (2.41))."""
         box, own = self.payload, self.mass
         if box is None or own.payload:
             return self
@@ -91,7 +91,7 @@ class Airframe(Section):
 
     @property
     def about_centre(self) -> "Airframe":
-        """Return the airframe with every position relative to the centre of mass."""
+        """Airframe with every position relative to the centre of mass."""
         if not any(self.mass.centre):
             return self
         x, y, z = self.mass.centre

@@ -39,12 +39,12 @@ def desired_load(path, t):
 def desired_specific_force(p, t, x, acceleration):
     """Return the desired v' - a_g of the load [m/s^2] and its derivative, at its actual acceleration (eq. (7.22))."""
     c = p.drive
-    position, velocity, wanted_acceleration = desired_load(c.path, t)
+    position, velocity, desired_acceleration = desired_load(c.path, t)
     e_y, e_v = subtract(x.load_position, position), subtract(x.load_velocity, velocity)
     feedback = add(scale(-c.load_position_gain, e_y), scale(-c.load_velocity_gain, e_v))
-    change = subtract(wanted_acceleration, acceleration)
+    change = subtract(desired_acceleration, acceleration)
     slope = add(scale(-c.load_position_gain, e_v), scale(c.load_velocity_gain, change))
-    return add(add(feedback, wanted_acceleration), (0.0, 0.0, p.gravity)), slope
+    return add(add(feedback, desired_acceleration), (0.0, 0.0, p.gravity)), slope
 
 
 @always_inline
@@ -127,10 +127,10 @@ def moment(p, x, force, force_rate, i):
     """Return the moment [N m] that aligns body z with the desired force (theory.md, eq. (7.27))."""
     c = p.drive
     limited, kept_rate = upright(force, force_rate, UPRIGHT_SHARE * p.quad_mass[i] * p.gravity)
-    desired, omega_wanted = desired_attitude(limited, kept_rate)
+    desired, desired_omega = desired_attitude(limited, kept_rate)
     difference = matmul(transpose(desired), rotation_matrix(x.attitude[i]))
     o = x.omega_body[i]
-    rate_error = subtract(o, apply_transposed(difference, omega_wanted))
+    rate_error = subtract(o, apply_transposed(difference, desired_omega))
     damped = scale(-c.attitude_rate_gain / c.epsilon, rate_error)
     turned = scale(-c.attitude_gain / (c.epsilon * c.epsilon), vee(difference))
     return add(add(turned, damped), cross(o, multiply(p.quad_inertia[i], o)))
@@ -149,5 +149,5 @@ def quad_thrust(p, x, desired, slope, s, s_rate, i):
 def quad_moment(p, x, desired, slope, s, s_rate, force, specific, i):
     """Return the moment [N m] of quadrotor i for all forces [N] and the specific acceleration [m/s^2]."""
     omega_rate = link_acceleration(p, x, force, specific, i)
-    wanted_thrust, thrust_rate = desired_force(p, x, desired, slope, s, s_rate, omega_rate, i)
-    return moment(p, x, wanted_thrust, thrust_rate, i)
+    force_i, force_i_rate = desired_force(p, x, desired, slope, s, s_rate, omega_rate, i)
+    return moment(p, x, force_i, force_i_rate, i)

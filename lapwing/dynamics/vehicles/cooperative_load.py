@@ -132,7 +132,8 @@ def _link_rate(p, x, force, specific, i):
 
 
 @always_inline
-def _body_rate(p, x, lift, i):
+def body_rate(p, x, lift, i):
+    """Return the angular acceleration [rad/s^2] of quadrotor i under a LiftCommand (theory.md, eq. (7.18))."""
     inertia, o = p.quad_inertia[i], x.omega_body[i]
     return divide(add(lift.moment_body[i], cross(multiply(inertia, o), o)), inertia)
 
@@ -147,7 +148,7 @@ def rate(p, t, x):
         x.load_velocity,
         add(specific, (0.0, 0.0, -p.gravity)),
         x.omega_body,
-        map_index(_body_rate, x.link, p, x, lift),
+        map_index(body_rate, x.link, p, x, lift),
         map_index(_link_rate, x.link, p, x, force, specific),
     )
 

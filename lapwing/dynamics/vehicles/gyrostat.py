@@ -31,7 +31,7 @@ class GyrostatParameters(NamedTuple):
 
     @property
     def torque_without_rate(self) -> bool:
-        """Return True if the torque of rotors, friction and feedback depends on time and attitude only."""
+        """True if the torque of rotors, friction and feedback depends on time and attitude only."""
         of_rate = (*self.rotor_momentum, self.damping, *self.linear_gain, *self.cubic_gain, self.rate_gain)
         return not any(of_rate)
 

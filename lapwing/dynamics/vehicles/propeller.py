@@ -29,6 +29,22 @@ def drag_coefficients(propeller: "Propeller") -> tuple[float, float]:
     return propeller.zero_lift_drag, induced
 
 
+def thrust_constant(propeller: "Propeller") -> float:
+    """Return the static thrust over air density and squared rotor speed [m^4/rad^2]: C_T D^4 / (4 pi^2)."""
+    return thrust_coefficient(propeller) * math.pow(propeller.diameter, 4) / math.square(2.0 * math.pi)
+
+
+def torque_constant(propeller: "Propeller") -> float:
+    """Return the static torque over air density and squared rotor speed [m^5/rad^2]: C_M D^5 / (4 pi^2)."""
+    return torque_coefficient(propeller) * math.pow(propeller.diameter, 5) / math.square(2.0 * math.pi)
+
+
+def hover_flow(propeller: "Propeller") -> float:
+    """Return the induced velocity in hover over the rotor speed [m/rad], by momentum theory."""
+    radius = 0.5 * propeller.diameter
+    return math.sqrt(0.5 * thrust_constant(propeller) / (math.pi * radius * radius))
+
+
 def from_stand(
     propeller: "Propeller", density: float, speed: float, thrust: float, torque: float
 ) -> tuple[float, float]:

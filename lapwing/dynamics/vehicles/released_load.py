@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from lapwing.dynamics.integrators import RATES
 from lapwing.dynamics.lie.quaternion import Quaternion
-from lapwing.dynamics.vector import Vec3, add, cross, divide, multiply, scale
+from lapwing.dynamics.vector import Vec3, add, scale
 from lapwing.dynamics.vehicles import cooperative_load as formation
 from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters, CooperativeLoadState, LiftCommand
 from lapwing.kernels import always_inline
@@ -49,19 +49,13 @@ def _acceleration(p, x, i):
 
 
 @always_inline
-def _body_rate(p, x, i):
-    inertia, o = p.quad_inertia[i], x.omega_body[i]
-    return divide(add(p.drive.moment_body[i], cross(multiply(inertia, o), o)), inertia)
-
-
-@always_inline
 def rate(p, t, x):
     """Return the tangent of the free bodies (theory.md, eqs. (7.18) and (7.29))."""
     return ReleasedLoadState(
         x.load_velocity,
         (0.0, 0.0, -p.gravity),
         x.omega_body,
-        map_index(_body_rate, x.quad_position, p, x),
+        map_index(formation.body_rate, x.quad_position, p, x, p.drive),
         x.quad_velocity,
         map_index(_acceleration, x.quad_position, p, x),
     )

@@ -22,7 +22,7 @@ class FreeBodyParameters(NamedTuple):
 
     @property
     def torque_without_rate(self) -> bool:
-        """Return the torque, which is zero."""
+        """True: the torque is zero."""
         return True
 
 

@@ -2,7 +2,7 @@
 
 The pack is a rigid box with six degrees of freedom, the door turns about its lower edge (theory.md, chapter 9). The
 hinge is the origin of the crate's frame: x outward along the tilted floor, y along the hinge, z away from the floor.
-The source is Pappalardo et al. 2023, sections 3.6, 3.7 and 6.2, which gives the spring; the sizes are ours.
+The source is Pappalardo et al. 2023, sections 3.6, 3.7 and 6.2, which defines the spring; the sizes are chosen.
 """
 
 from typing import NamedTuple

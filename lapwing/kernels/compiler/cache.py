@@ -38,12 +38,13 @@ def statistics() -> Statistics:
 def on_compile(listener: Callable[[str], None]) -> None:
     """Call `listener` with the name of every kernel ("module.function") before it is compiled.
 
-    The listener is also called before this process waits for another process that compiles the kernel."""
+    The listener is also called before this process waits for another process that compiles the kernel.
+    """
     _listeners.append(listener)
 
 
 class KernelCache(_Cache):
-    """Store of one kernel's machine code below `_files.root()`; it stores nothing if it cannot write."""
+    """Store of one kernel's machine code below `cache_files.root()`; it stores nothing if it cannot write."""
 
     def __init__(self, dispatcher: Dispatcher):
         self._dispatcher = dispatcher

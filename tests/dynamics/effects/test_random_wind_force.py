@@ -3,7 +3,7 @@ import pytest
 from scipy.signal import welch
 
 from lapwing.dynamics import effects
-from lapwing.dynamics.effects.random_wind_force import draw, random_wind_force, told
+from lapwing.dynamics.effects.random_wind_force import draw, random_wind_force, reported_wind
 from lapwing.dynamics.noise import stream_key
 from lapwing.kernels import kernel
 
@@ -48,7 +48,7 @@ def test_wind_of_force_is_reported(drone, situation, rotors):
     """The reported wind is that of the force."""
     e, s = make(drone), situation(velocity=(1, 1, 0))
     memory = draw.py_func(e, e.initial_discrete_state(), s, rotors(), KEY, 5, 0.004)
-    wind = np.array(told.py_func(e, memory, (0.5, 0.0, 0.0))) - (0.5, 0.0, 0.0)
+    wind = np.array(reported_wind.py_func(e, memory, (0.5, 0.0, 0.0))) - (0.5, 0.0, 0.0)
     past = wind - (1.0, 1.0, 0.0)
     assert memory[0] == pytest.approx(0.5 * 0.06 * 1.22 * np.linalg.norm(past) * past)
 

@@ -83,11 +83,11 @@ def test_dexp_is_derivative_of_exp():
     assert difference == pytest.approx(spatial, abs=1e-8)
 
 
-def test_hat_vee_and_adjoint():
+def test_hat_and_vee():
     assert so3.vee(so3.hat(W)) == W
     r = np.array(so3.exp((0.2, 0.5, -1.0))).reshape(3, 3)
     hatted = r @ np.array(so3.hat(W)).reshape(3, 3) @ r.T
-    assert so3.adjoint(tuple(r.ravel()), W) == pytest.approx(so3.vee(tuple(hatted.ravel())), abs=1e-15)
+    assert tuple(r @ W) == pytest.approx(so3.vee(tuple(hatted.ravel())), abs=1e-15)
 
 
 def test_matrix_and_quaternion_leaves_agree():

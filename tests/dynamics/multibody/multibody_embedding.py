@@ -13,7 +13,7 @@ from lapwing.dynamics.multibody.augmented import (
     as_float_arrays,
     generalised_force,
     mass_roots,
-    refuse_singular,
+    raise_if_singular,
 )
 from lapwing.dynamics.multibody.stabilisation import rows
 
@@ -34,7 +34,7 @@ def accelerations(system, configuration, velocity, wrench=None, drive=None) -> R
     """
     configuration, velocity, wrench, drive = as_float_arrays(system, configuration, velocity, wrench, drive)
     p, e = rows(system.arrays, configuration, velocity, drive)
-    refuse_singular(system, p.singular)
+    raise_if_singular(system, p.singular)
     J, n = e.jacobian_t.T, 6 * len(system.bodies)
     Q, R, order = qr(J, pivoting=True, mode="economic")
     size = np.abs(np.diag(R))

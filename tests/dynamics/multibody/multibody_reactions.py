@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lapwing.dynamics.multibody.augmented import Solution, as_float_arrays, refuse_singular
+from lapwing.dynamics.multibody.augmented import Solution, as_float_arrays, raise_if_singular
 from lapwing.dynamics.multibody.body_kinematics import place
 from lapwing.dynamics.multibody.constraints import equations
 
@@ -24,7 +24,7 @@ def reactions(system, configuration, velocity, solution: Solution, drive=None) -
     """
     configuration, velocity, _, drive = as_float_arrays(system, configuration, velocity, None, drive)
     p = place(configuration, velocity)
-    refuse_singular(system, p.singular)
+    raise_if_singular(system, p.singular)
     e = equations(system.arrays, p, drive)  # twist columns: forces and torques in all coordinates
     n = len(system.bodies)
     out = {}

@@ -6,8 +6,8 @@ from multibody_angles import euler_from_quaternion
 from test_augmented import state
 
 from lapwing.dynamics.multibody.body_kinematics import add_increment
-from lapwing.dynamics.multibody.initial_conditions import check, consistent
 from lapwing.dynamics.multibody.mechanisms import bricard, drone_system, four_bars
+from lapwing.dynamics.multibody.simulation import check, consistent
 
 
 def test_violated_rows_are_named():

@@ -7,7 +7,7 @@ import pytest
 from mpmath import mp, mpf
 
 from lapwing.kernels import math as functions
-from lapwing.kernels.math.accuracy import SAMPLERS, error, exact, measure, samples
+from tests.kernels.math.accuracy import SAMPLERS, error, exact, measure, samples
 
 
 @pytest.mark.parametrize("name", SAMPLERS)

@@ -13,7 +13,7 @@ from numba import types
 from lapwing.kernels import kernel
 from lapwing.kernels import math as functions
 from lapwing.kernels.math import coefficients
-from lapwing.kernels.math.accuracy import samples
+from tests.kernels.math.accuracy import samples
 from tests.kernels.math.kernels import KERNELS
 
 

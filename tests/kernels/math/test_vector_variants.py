@@ -10,7 +10,7 @@ from numba.core.registry import cpu_target
 from lapwing.kernels import math as functions
 from lapwing.kernels import vectorise_loops
 from lapwing.kernels.math._vector_variants import vector_width
-from lapwing.kernels.math.accuracy import samples
+from tests.kernels.math.accuracy import samples
 from tests.kernels.math.kernels import KERNELS
 
 ODD = (0.0, -0.0, math.inf, -math.inf, math.nan, 5e-324, -1e-310, 1e300, -65536.0, math.nextafter(65536.0, 1e9), 1e22)

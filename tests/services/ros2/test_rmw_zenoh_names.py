@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from lapwing.messages import TYPES
-from lapwing.messages.attachment import unpack
+from lapwing.messages.attachment import pack
 from lapwing.messages.parse import dependencies
 from lapwing.messages.types import DEFINITIONS, FOLDER
 from lapwing.services.ros2.rmw_zenoh_names import PUBLISHER, SUBSCRIPTION, Endpoint, identifier, node_token
@@ -48,7 +48,7 @@ def test_attachment_equals_other_implementation():
     from zenoh_ros2_sdk.attachment import Attachment
 
     gid = identifier(Endpoint("/chatter", "std_msgs/msg/String").token(0, SESSION, 1, PUBLISHER))
-    assert unpack(Attachment(5, 7, gid).to_bytes()) == (5, 7, gid)
+    assert pack(5, 7, gid) == Attachment(5, 7, gid).to_bytes()
 
 
 def test_ros_package_declares_message_dependencies():

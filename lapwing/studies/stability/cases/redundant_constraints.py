@@ -17,9 +17,8 @@ from lapwing.dynamics.multibody.augmented import (
 from lapwing.dynamics.multibody.body_kinematics import add_increment
 from lapwing.dynamics.multibody.five_bodies import BodyState, arrays, machine
 from lapwing.dynamics.multibody.five_body_stabilisation import assembled_state
-from lapwing.dynamics.multibody.initial_conditions import consistent
 from lapwing.dynamics.multibody.mechanisms import bricard, drone_system, four_bars
-from lapwing.dynamics.multibody.simulation import simulate
+from lapwing.dynamics.multibody.simulation import consistent, simulate
 from lapwing.dynamics.multibody.stabilisation import defects, rows
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.drone import PAPER, delivery_drone

@@ -1,6 +1,6 @@
 """Errors of the elementary functions, measured against mpmath.
 
-`python -m lapwing.kernels.math.accuracy` prints the table of docs/explanation/elementary_functions.md; needs mpmath.
+`python -m tests.kernels.math.accuracy` prints the table of docs/explanation/elementary_functions.md; needs mpmath.
 """
 
 import math
