@@ -96,8 +96,14 @@ BAD = {
     ),
     "keys": ([HOVER, "--keys", "x"], "--keys: expected with --listen or --endpoints"),
     "door": ([HOVER, "--listen", "x"], "--listen x: expected an endpoint protocol/address:port"),
-    "option": ([HOVER, "--lgo", "x"], "(see lapwing run --help)"),
-    "no scene": ([], "Missing argument 'SCENE'"),
+    "option": ([HOVER, "--lgo", "x"], "--lgo: unknown option; did you mean --log? (see lapwing run --help)"),
+    "slow": (
+        [HOVER, "--speed", "1e-9"],
+        "--speed 1e-9: a tick of 0.004 s would take over 1 s; expected at least 0.004",
+    ),
+    "slow scene": ([HOVER, "--set", "run.real_time_factor=1e-300"], "run.real_time_factor 1e-300: a tick of 0.004 s"),
+    "dash": ([HOVER, "--json", "-"], "-: standard output is not supported here; expected the path of an output"),
+    "no scene": ([], "SCENE: missing (see lapwing run --help)"),
 }
 
 
@@ -144,7 +150,18 @@ def test_invalid_run_is_rejected_in_one_line(lapwing, arguments, expected):
             ["service", "plant", HOVER, "--endpoints", PEERS, "--key-prefix", "a b"],
             "--key-prefix a b: expected letters",
         ),
-        (["fly"], "No such command 'fly'"),
+        (["campaign", HOVER, "--out", "-"], "-: standard output is not supported here"),
+        (["certificates", "-"], "-: standard output is not supported here"),
+        (["export-library", HOVER, "--out", "-"], "-: standard output is not supported here"),
+        (["campaign", HOVER, "--vary", "vehicle.mas=normal(9,1)"], "--vary vehicle.mas: unknown key 'mas'; did you"),
+        (["fly"], "fly: unknown command (see lapwing --help)"),
+        (["runn"], "runn: unknown command; did you mean run? (see lapwing --help)"),
+        (["new"], "COMMAND: missing (see lapwing new --help)"),
+        (["check", "hover", "more"], "more: unexpected argument (see lapwing check --help)"),
+        (["info", "a.mcap", "--log"], "--log: unknown option (see lapwing info --help)"),
+        (["import", "a.ulg"], "--out: missing (see lapwing import --help)"),
+        (["import", "a.ulg", "--out"], "--out: expected a value (see lapwing import --help)"),
+        (["run", "hover", "--view=1"], "--view: takes no value (see lapwing run --help)"),
     ],
 )
 def test_other_invalid_commands_are_rejected_in_one_line(lapwing, arguments, expected):
@@ -219,6 +236,29 @@ def test_check_prints_configuration(lapwing):
         "  sensors   none",
         "  services  plant, trajectory, autopilot; 250 Hz, gauss_seidel",
     ]
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "message"),
+    [
+        ("--runs", "0", "--runs 0: expected a number from 1 to 10000000"),
+        ("--vary", "vehicle.mass=normal(1", "expected a distribution, normal, uniform"),
+        ("--vary", "vehicle.mass", "--vary vehicle.mass: expected KEY=DISTRIBUTION"),
+        ("--design", "lsh", "design lsh: expected one of random, lhs, sobol, grid"),
+        ("--seed", "0", "seed 0: expected a whole number from 1"),
+        ("--shard", "3/2", "--shard 3/2: expected I/N with I from 1 to N"),
+        ("--sweep", "none.csv", "--sweep none.csv: cannot be read"),
+        ("--workers", "0", "--workers 0: expected at least 1"),
+    ],
+)
+def test_campaign_checks_values_before_slow_imports(option, value, message):
+    command = [sys.executable, "-X", "importtime", "-m", "lapwing", "campaign", "hover", option, value]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    lines = result.stderr.splitlines()
+    modules = {line.rpartition("|")[2].strip() for line in lines if line.startswith("import time:")}
+    assert result.returncode == 2
+    assert message in lines[-1]
+    assert not modules & {"numba", "matplotlib", "lapwing.services.scene_resolver", "scipy.stats"}
 
 
 def test_command_shows_no_traceback():
