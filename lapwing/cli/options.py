@@ -18,9 +18,7 @@ Overrides = Annotated[
 KeyPrefix = Annotated[str, typer.Option(metavar="NAME", help="prefix of the run's Zenoh keys")]
 Speed = Annotated[
     str | None,
-    typer.Option(
-        metavar="1|N|max", help="simulated seconds per second (overrides run.real_time_factor); max: unlimited"
-    ),
+    typer.Option(metavar="1|N|max", help="simulated seconds per second; max: unlimited"),
 ]
 Keys = Annotated[
     Path | None,

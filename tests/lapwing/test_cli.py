@@ -150,6 +150,8 @@ def test_invalid_run_is_rejected_in_one_line(lapwing, arguments, expected):
             ["service", "plant", HOVER, "--endpoints", PEERS, "--key-prefix", "a b"],
             "--key-prefix a b: expected letters",
         ),
+        (["protocol", HOVER, "--plot", "a.txt"], "--plot a.txt: unknown format; use a name that ends in .png"),
+        (["protocol", HOVER, "--plot", "a.svg", "--json", "a.svg"], "--plot a.svg: is the same file as --json"),
         (["campaign", HOVER, "--out", "-"], "-: standard output is not supported here"),
         (["certificates", "-"], "-: standard output is not supported here"),
         (["export-library", HOVER, "--out", "-"], "-: standard output is not supported here"),
