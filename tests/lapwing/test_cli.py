@@ -263,6 +263,32 @@ def test_campaign_checks_values_before_slow_imports(option, value, message):
     assert not modules & {"numba", "matplotlib", "lapwing.services.scene_resolver", "scipy.stats"}
 
 
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("run hover --speed 1e-9", "--speed 1e-9: a tick of 0.004 s would take over 1 s"),
+        ("run hover --mode single-process --json -", "-: standard output is not supported here"),
+        ("schema foo", "KIND: unknown kind of file 'foo'; expected one of airframe, gains, scene"),
+        ("import flight.csv --out a.mcap --mapping m.toml", "--mapping m.toml: tme: unknown key 'tme'; did you mean"),
+        ("import flight.csv --out a.mcap --mapping none.toml", "--mapping none.toml: cannot be read"),
+        ("import flight.csv --out a.mcap --mapping nanobench", "flight.csv: none of the mapped columns"),
+        ("identify hover flight.csv --out a.toml", "--free: missing; name the keys to estimate"),
+        ("identify hover flight.csv --mapping m.toml --free a.b --out a.toml", "--free a.b: no number of this name"),
+    ],
+)
+def test_process_rejects_input_in_one_line_and_writes_no_file(tmp_path, arguments, message):
+    (tmp_path / "m.toml").write_text('[tme]\ncolumn = "t"\nunit = "s"\n')
+    (tmp_path / "flight.csv").write_text("a,b\n1,2\n")
+    command, environment = [sys.executable, "-m", "lapwing", *arguments.split()], os.environ | {"PYTHONPATH": str(ROOT)}
+    result = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert (result.returncode, result.stdout, result.stderr.count("\n")) == (2, "", 1)
+    assert message in result.stderr
+    assert sorted(os.listdir(tmp_path)) == ["flight.csv", "m.toml"]
+
+
 def test_command_shows_no_traceback():
     command = [sys.executable, "-m", "lapwing", "run", "scenes/none.toml"]
     result = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
