@@ -7,12 +7,13 @@ import typer
 
 from lapwing.cli.app import app
 from lapwing.cli.options import Overrides, SceneFile
-from lapwing.cli.output_paths import check_distinct, claim, claim_folder, claim_report
+from lapwing.cli.output_paths import check_distinct, check_not_dash, claim, claim_folder, claim_report
 from lapwing.cli.preflight import check_firmware_program, with_solver_selected
 
 if TYPE_CHECKING:
     from rich.console import Console
 
+    from lapwing.studies.campaign.distributions import Distribution
     from lapwing.studies.campaign.folder import Folder
     from lapwing.studies.campaign.plan import Plan
     from lapwing.studies.campaign.runs import Reference
@@ -67,16 +68,7 @@ def campaign(
 
     Reports error distributions, the failure probability, and which parameters matter.
     """
-    from lapwing.file_schemas.key_units import key_units
     from lapwing.services.common import foreign_code
-    from lapwing.studies.campaign import console_output
-    from lapwing.studies.campaign.campaign_report import write
-    from lapwing.studies.campaign.distributions import parse
-    from lapwing.studies.campaign.folder import begin, default_path, manifest
-    from lapwing.studies.campaign.plan import plan
-    from lapwing.studies.campaign.results import Results
-    from lapwing.studies.terminal import console
-    from lapwing.studies.workers import cores
 
     with foreign_code.permission(allow_code):
         if workers is not None and workers < 1:
@@ -90,33 +82,41 @@ def campaign(
         if cluster is not None and workers is not None:
             raise ValueError("--workers: a cluster has its own workers; leave out --cluster")
         check_distinct({"SCENE": scene, "--sweep": sweep, "--json": json, "--report": report})
+        check_not_dash(out)
         claim(json)
         claim_report("--report", report)
-        screen, varied = console(), {}
-        for text in vary or []:
-            key, separator, distribution = (part.strip() for part in text.partition("="))
-            if not separator or not key:
-                raise ValueError(f"--vary {text}: expected KEY=DISTRIBUTION")
-            if key in varied:
-                raise ValueError(f"--vary {text}: {key} already has a distribution; use one for each key")
-            try:
-                varied[key] = parse(distribution)
-            except ValueError as error:
-                raise ValueError(f"--vary {text}: {error}") from None
+        selected_part = _parse_shard(shard)
+
+        from lapwing.studies.campaign.plan import plan  # imports scipy
+
+        campaign_plan = plan(str(scene), set_ or [], runs, seed, _distributions(vary or []), sweep, design)
         selected = with_solver_selected(scene, set_ or [])
         check_firmware_program(selected)
-        campaign_plan = plan(str(scene), selected.overrides, runs, seed, varied, sweep, design)
+        campaign_plan = campaign_plan._replace(overrides=tuple(selected.overrides))
+
+        from lapwing.studies.campaign.folder import begin, default_path, manifest
+        from lapwing.studies.terminal import console
+        from lapwing.studies.workers import cores
+
+        screen = console()
         first = _reference(screen, campaign_plan)
         campaign_manifest = manifest(campaign_plan, first)
         folder = begin(out or default_path(campaign_manifest), campaign_plan, campaign_manifest)
         claim_folder(folder.path, shared=shard is not None)
-        part = _part(shard, len(folder.shards))
+        part = _shards_of(selected_part, len(folder.shards))
         number = 0 if cluster else min(workers or cores(), len(folder.missing()))
         _fly(screen, folder, first, _workers(screen, cluster, number), number, ci_half_width, part)
         if shard is not None and folder.missing():
             screen.print(f"{folder.path}: part {shard} complete, {len(folder.missing())} shards missing")
             return
-        digest, results = folder.finish(csv), Results(folder, key_units(campaign_plan.keys))
+        digest = folder.finish(csv)
+
+        from lapwing.file_schemas.key_units import key_units
+        from lapwing.studies.campaign import console_output
+        from lapwing.studies.campaign.campaign_report import write
+        from lapwing.studies.campaign.results import Results
+
+        results = Results(folder, key_units(campaign_plan.keys))
         console_output.show(screen, results)
         if json:
             console_output.write_json(json, results, digest)
@@ -154,16 +154,42 @@ def _reference(screen: "Console", campaign_plan: "Plan") -> "Reference":
         return reference(run, setup)
 
 
-def _part(shard: str | None, shards: int) -> range | None:
-    """Return the shards of part I of N; None without --shard."""
-    if shard is None:
+def _distributions(vary: list[str]) -> "dict[str, Distribution]":
+    """Return the distributions of texts KEY=DISTRIBUTION by key."""
+    from lapwing.studies.campaign.distributions import parse  # imports scipy
+
+    result: dict[str, Distribution] = {}
+    for text in vary:
+        key, separator, distribution = (part.strip() for part in text.partition("="))
+        if not separator or not key:
+            raise ValueError(f"--vary {text}: expected KEY=DISTRIBUTION")
+        if key in result:
+            raise ValueError(f"--vary {text}: {key} already has a distribution; use one for each key")
+        try:
+            result[key] = parse(distribution)
+        except ValueError as error:
+            raise ValueError(f"--vary {text}: {error}") from None
+    return result
+
+
+def _parse_shard(text: str | None) -> tuple[int, int] | None:
+    """Return (I, N) of --shard I/N; None without --shard."""
+    if text is None:
         return None
-    i, _, n = shard.partition("/")
-    if not (i.isdigit() and n.isdigit() and 1 <= int(i) <= int(n)):
-        raise ValueError(f"--shard {shard}: expected I/N with I from 1 to N, for example 3/8")
-    if int(n) > shards:
-        raise ValueError(f"--shard {shard}: the campaign has {shards} shards; expected at most I/{shards}")
-    return range(int(i) - 1, shards, int(n))
+    i, _, n = text.partition("/")
+    if not (i.isdecimal() and n.isdecimal() and 1 <= int(i) <= int(n)):
+        raise ValueError(f"--shard {text}: expected I/N with I from 1 to N, for example 3/8")
+    return int(i), int(n)
+
+
+def _shards_of(part: tuple[int, int] | None, shards: int) -> range | None:
+    """Return the shards of part I of N; None without --shard."""
+    if part is None:
+        return None
+    i, n = part
+    if n > shards:
+        raise ValueError(f"--shard {i}/{n}: the campaign has {shards} shards; expected at most I/{shards}")
+    return range(i - 1, shards, n)
 
 
 def _workers(screen: "Console", cluster: str | None, number: int) -> "Workers":

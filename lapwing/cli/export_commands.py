@@ -7,7 +7,7 @@ import typer
 
 from lapwing.cli.app import app
 from lapwing.cli.options import Overrides, SceneFile
-from lapwing.cli.output_paths import claim, claim_folder
+from lapwing.cli.output_paths import claim, create_folder
 from lapwing.cli.preflight import with_solver_selected
 
 Part = Annotated[str, typer.Option(metavar="PART", help="plant, sensors, autopilot, trajectory or vehicle (all)")]
@@ -45,8 +45,7 @@ def export_library(
         from lapwing.services.scene_resolver import resolve
 
         setup = resolve(with_solver_selected(scene, set_ or []))
-        out.mkdir(parents=True, exist_ok=True)
-        claim_folder(out)
+        create_folder(out, parents=True)
         export_library(setup, part, out, cpu)
         name = library_name(setup, part)
         size = (out / f"lib/lib{name}.so").stat().st_size / 1e6

@@ -122,16 +122,16 @@ def identify(
         console_output.write_json(json, result)
 
 
-def _is_given(context: typer.Context, name: str) -> bool:
+def _is_on_command_line(context: typer.Context, name: str) -> bool:
     source = context.get_parameter_source(name)
     return source is not None and source.name == "COMMANDLINE"
 
 
 def _check_sensor_options(context: typer.Context) -> None:
-    """Raise ValueError if the user gives an option that `--sensors` does not use."""
+    """Raise ValueError for an option on the command line that `--sensors` does not use."""
     used = {"scene", "flights", "out", "sensors", "mapping"}
-    given = [name for name in context.params if _is_given(context, name)]
-    unused = [f"--{name.strip('_').replace('_', '-')}" for name in given if name not in used]
+    names = [name for name in context.params if name not in used and _is_on_command_line(context, name)]
+    unused = [f"--{name.strip('_').replace('_', '-')}" for name in names]
     if unused:
         raise ValueError(f"--sensors: estimates all sensors, from all samples; leave out {', '.join(unused)}")
 

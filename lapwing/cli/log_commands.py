@@ -8,7 +8,7 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.error_exit import DIFFERENT, fail
 from lapwing.cli.options import LogFile
-from lapwing.cli.output_paths import check_distinct, check_log, claim, claim_folder
+from lapwing.cli.output_paths import check_distinct, check_log, claim, create_folder
 from lapwing.cosim.output_lock import write_errors
 
 if TYPE_CHECKING:
@@ -121,14 +121,13 @@ def export(
         result = tables.tables(read, topics.split(",") if topics is not None else None)
         if not read.complete:
             typer.echo(f"{log}: the log is incomplete: its end is missing, see lapwing info", err=True)
-    for folder, write in ((parquet, tables.write_parquet), (csv, tables.write_csv), (mat, tables.write_mat)):
-        if folder is None:
+    for target, write in ((parquet, tables.write_parquet), (csv, tables.write_csv), (mat, tables.write_mat)):
+        if target is None:
             continue
-        with write_errors(folder):
-            if folder is not mat:
-                folder.mkdir(exist_ok=True)
-                claim_folder(folder)
-            for path in write(result, folder):
+        if target is not mat:
+            create_folder(target)
+        with write_errors(target):
+            for path in write(result, target):
                 typer.echo(path)
 
 

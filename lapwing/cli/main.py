@@ -1,6 +1,7 @@
 """Command line. The other modules of this package register the commands, which import their dependencies late."""
 
 import os
+import re
 import resource
 import sys
 from typing import Annotated
@@ -31,8 +32,16 @@ from lapwing.cli.stdout_guard import check_output
 
 # Raised for unknown options and missing arguments; not every version of typer exports the class.
 UsageError: type[typer.BadParameter] = typer.BadParameter.__base__  # type: ignore[assignment]
-
-
+REWORDED = {  # messages of typer
+    r"^Missing (?:argument|option) '(.+)'\.$": r"\1: missing",
+    r"^Missing command\.$": "COMMAND: missing",
+    r"^No such command '(.+?)'\.": r"\1: unknown command",
+    r"^No such option: (\S+)": r"\1: unknown option",
+    r" (?:Did you mean '(.+)'\?|\(Possible options: (.+)\)|Did you mean (--\S+)\?)$": r"; did you mean \1\2\3?",
+    r"^Got unexpected extra arguments?(?:\(s\))? \((.+)\)$": r"\1: unexpected argument",
+    r"^Option '(.+)' requires an argument\.$": r"\1: expected a value",
+    r"^Option '(.+)' does not take a value\.$": r"\1: takes no value",
+}
 FEWEST_FILES = 64  # open files; a run with several processes needs about 30
 
 
@@ -94,16 +103,24 @@ def main() -> None:
             with foreign_code.permission(False):
                 app(sys.argv[1:] or ["--help"], prog_name="lapwing", standalone_mode=False)
         except UsageError as error:
-            command = error.ctx.command_path if error.ctx else "lapwing"
+            command = error.ctx.command_path if error.ctx else " ".join(["lapwing", *_command_name()])
             fail(f"{_usage_text(error)} (see {command} --help)", USER_ERROR)
 
 
+def _command_name() -> list[str]:
+    """Return the first argument in a list if it is not an option."""
+    return [text for text in sys.argv[1:2] if not text.startswith("-")]
+
+
 def _usage_text(error: typer.BadParameter) -> str:
-    """Return the fault of a command line, with the value that typer leaves out."""
+    """Return the fault of a command line in the style of other errors, with the value that typer leaves out."""
     details: list = getattr(error.__cause__, "errors", list)()  # of pydantic, in newer versions of typer
     parameter = getattr(error, "param", None)
     if not details or parameter is None or details[0]["type"] == "value_error":
-        return error.format_message()
+        text = error.format_message()
+        for pattern, replacement in REWORDED.items():
+            text = re.sub(pattern, replacement, text)
+        return text
     name = parameter.opts[0] if parameter.opts[0].startswith("-") else str(parameter.metavar or parameter.name)
     expected = details[0]["msg"].removeprefix("Input should be ").partition(", unable to parse")[0]
     number = "a number " if expected.startswith(("less", "greater")) else ""

@@ -12,6 +12,13 @@ new = typer.Typer(help="Create a scene, airframe, effect or other extension.", r
 app.add_typer(new, name="new")
 
 TEMPLATES = Path(__file__).parent / "templates"
+EXTENSIONS = {  # kinds of extensions, and what their commands create
+    "controller": "a controller",
+    "estimator": "an estimator",
+    "sensor": "a sensor",
+    "effect": "an effect",
+    "segment": "a trajectory segment",
+}
 ModuleName = Annotated[str, typer.Argument(metavar="NAME", help="name of the module, e.g. tether_drag")]
 
 
@@ -21,39 +28,17 @@ def scene(name: Annotated[str, typer.Argument(metavar="NAME", help="name of the 
     typer.echo(write_scene(name, Path()))
 
 
-@new.command()
-def controller(name: ModuleName) -> None:
-    """Create a controller: NAME.py and test_NAME.py."""
-    _create("controller", name)
+def _register(kind: str, noun: str) -> None:
+    """Register the command that creates an extension of this kind."""
+
+    @new.command(kind, help=f"Create {noun}: NAME.py and test_NAME.py.")
+    def create(name: ModuleName) -> None:
+        for path in write_module(kind, name, Path()):
+            typer.echo(path)
 
 
-@new.command()
-def estimator(name: ModuleName) -> None:
-    """Create an estimator: NAME.py and test_NAME.py."""
-    _create("estimator", name)
-
-
-@new.command()
-def sensor(name: ModuleName) -> None:
-    """Create a sensor: NAME.py and test_NAME.py."""
-    _create("sensor", name)
-
-
-@new.command()
-def effect(name: ModuleName) -> None:
-    """Create an effect: NAME.py and test_NAME.py."""
-    _create("effect", name)
-
-
-@new.command()
-def segment(name: ModuleName) -> None:
-    """Create a trajectory segment: NAME.py and test_NAME.py."""
-    _create("segment", name)
-
-
-def _create(kind: str, name: str) -> None:
-    for path in write_module(kind, name, Path()):
-        typer.echo(path)
+for _kind, _noun in EXTENSIONS.items():
+    _register(_kind, _noun)
 
 
 def write_scene(name: str, folder: Path) -> Path:

@@ -18,9 +18,7 @@ Overrides = Annotated[
 KeyPrefix = Annotated[str, typer.Option(metavar="NAME", help="prefix of the run's Zenoh keys")]
 Speed = Annotated[
     str | None,
-    typer.Option(
-        metavar="1|N|max", help="simulated seconds per second (overrides run.real_time_factor); max: unlimited"
-    ),
+    typer.Option(metavar="1|N|max", help="simulated seconds per second; max: unlimited"),
 ]
 Keys = Annotated[
     Path | None,
@@ -140,6 +138,24 @@ class LinkOptions:
 def absolute(path: Path | None) -> str:
     """Return an absolute path as text, "" for None."""
     return str(path.absolute()) if path else ""
+
+
+LONGEST_TICK = 1.0  # [s] of wall time; services without a message for 2.5 s count as stalled
+
+
+def check_pace(source: str, speed: float | None, interval: float) -> None:
+    """Raise ValueError if a tick takes so long that the services of a run would count as stalled.
+
+    Args:
+        source: option or key that sets the speed, with its value.
+        speed: simulated seconds per second, None for unlimited.
+        interval: [s] simulated time of a tick.
+    """
+    if speed is not None and interval > LONGEST_TICK * speed:
+        raise ValueError(
+            f"{source}: a tick of {interval:g} s would take over {LONGEST_TICK:g} s; expected at least"
+            f" {interval / LONGEST_TICK:g}, or a higher communication.rate"
+        )
 
 
 def parse_speed(text: str | None) -> float | None:

@@ -37,6 +37,20 @@ def claim_named(option: str, path: Path | None, ending: str) -> None:
     claim(path)
 
 
+def check_not_dash(path: Path | None) -> None:
+    """Raise ValueError for "-", which means standard output in other programs and would name a file here."""
+    if path is not None and str(path) == "-":
+        raise ValueError("-: standard output is not supported here; expected the path of an output")
+
+
+def create_folder(path: Path, parents: bool = False) -> None:
+    """Create a folder unless it exists, and claim it (see `claim_folder`)."""
+    check_not_dash(path)
+    with write_errors(path):
+        path.mkdir(parents=parents, exist_ok=True)
+    claim_folder(path)
+
+
 def claim_folder(path: Path, shared: bool = False) -> None:
     """Lock an existing folder until the command ends.
 
@@ -143,6 +157,7 @@ def check_distinct(paths: dict[str, Path | None]) -> None:
 
 def _create(path: Path) -> None:
     """Create a file unless it exists; the end of the command removes it if it is still empty."""
+    check_not_dash(path)
     if path.is_dir():
         raise ValueError(f"{path}: is a folder; expected the path of an output file")
     is_new = not path.exists()

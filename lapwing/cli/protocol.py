@@ -7,7 +7,7 @@ import typer
 
 from lapwing.cli.app import app
 from lapwing.cli.options import Overrides, SceneFile
-from lapwing.cli.output_paths import claim
+from lapwing.cli.output_paths import check_distinct, claim, claim_plot
 from lapwing.cli.preflight import with_solver_selected
 from lapwing.cosim.complete_file import write_text
 
@@ -20,7 +20,7 @@ def protocol(
         Path | None, typer.Option(metavar="FILE", help="write the protocol and the run configuration as JSON")
     ] = None,
     plot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="write a diagram of the services and their ports")
+        Path | None, typer.Option(metavar="FILE", help="write a diagram of the services (PNG, SVG or PDF)")
     ] = None,
 ) -> None:
     """Show the ports, periods and columns of each service.
@@ -32,8 +32,9 @@ def protocol(
     from lapwing.cosim.transport.packet_layout import layout
     from lapwing.services.scene_resolver import resolve
 
+    check_distinct({"SCENE": scene, "--json": json, "--plot": plot})
     claim(json)
-    claim(plot)
+    claim_plot(plot)
     setup = resolve(with_solver_selected(scene, set_ or []))
     result = layout(setup)
     if plot:

@@ -11,7 +11,7 @@ import typer
 
 from lapwing.cli import plan_options
 from lapwing.cli.app import app
-from lapwing.cli.options import absolute, parse_speed, with_options
+from lapwing.cli.options import absolute, check_pace, parse_speed, with_options
 from lapwing.cli.output_paths import (
     check_distinct,
     check_log,
@@ -121,10 +121,12 @@ def _spec(options: RunOptions, scene: "Scene") -> "ProcessSpec":
         message = f"--mavlink: {firmware} flies the vehicle and has its own MAVLink or MSP links"
         raise ValueError(f"{message}; connect the ground station to the firmware")
     foreign_code.check(setup)
-    speed, table, realtime = options.speed, options.table, options.realtime
-    if speed is None:
+    speed, table, realtime = parse_speed(options.speed), options.table, options.realtime
+    if options.speed is None:
         paced = options.mavlink or options.view or realtime or options.ros2 is not None
-        speed = str(scene[Run].real_time_factor) if scene[Run].real_time_factor else "1" if paced else None
+        speed = scene[Run].real_time_factor or (1.0 if paced else None)
+    source = f"run.real_time_factor {speed}" if options.speed is None else f"--speed {options.speed}"
+    check_pace(source, speed, setup.interval)
     if table is not None:
         check_complete(table, [*required_processes(setup, external_services(table)), MONITOR])
     log = options.log or reserve_log(scene.name)
@@ -142,7 +144,7 @@ def _spec(options: RunOptions, scene: "Scene") -> "ProcessSpec":
         setup=setup,
         peers=table or {},
         key_prefix=options.key_prefix,
-        speed=parse_speed(speed),
+        speed=speed,
         log=absolute(log),
         sources={name: content.decode() for name, content in scene.sources.items()},
         mode=options.mode,

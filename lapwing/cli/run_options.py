@@ -7,7 +7,7 @@ from typing import Annotated
 import typer
 
 from lapwing.cli.endpoint_checks import check_endpoints, check_external
-from lapwing.cli.options import KeyPrefix, Keys, LinkOptions, Overrides, PlanFiles, SceneFile, Speed, parse_speed
+from lapwing.cli.options import KeyPrefix, Keys, LinkOptions, Overrides, PlanFiles, SceneFile, parse_speed
 
 MULTI_PROCESS, SINGLE_PROCESS = "multi-process", "single-process"
 ALTERNATIVES = {  # options of a run that starts its own processes, and what to use in other runs
@@ -27,7 +27,10 @@ class RunOptions(LinkOptions):
     scene: SceneFile
     set_: Overrides = None
     plan: PlanFiles = None
-    speed: Speed = None
+    speed: Annotated[
+        str | None,
+        typer.Option(metavar="1|N|max", help="simulated seconds per second; max: unlimited [run.real_time_factor]"),
+    ] = None
     realtime: Annotated[
         bool, typer.Option("--realtime", help="fly at speed 1, in the real-time scheduling class where permitted")
     ] = False

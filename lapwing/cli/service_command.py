@@ -18,6 +18,7 @@ from lapwing.cli.options import (
     SceneFile,
     Speed,
     absolute,
+    check_pace,
     parse_speed,
     with_options,
 )
@@ -71,9 +72,11 @@ def service(options: ServiceOptions) -> None:
     }
     if name in required and required[name][1] is None:
         raise ValueError(f"service {name}: expected {required[name][0]}")
+    speed = parse_speed(options.speed)
     options.validate_links()
     loaded = with_solver_selected(scene, [*overrides, *plan_options.overrides(plan, scene, overrides)])
     setup = resolve(loaded, plan_options.commands(plan, loaded))
+    check_pace(f"--speed {options.speed}", speed, setup.interval)
     if entry.lock_step and entry.name not in setup.services:
         typer.echo(f"{name}: not part of {scene}")  # compose starts every service
         return
@@ -83,7 +86,7 @@ def service(options: ServiceOptions) -> None:
             setup=setup,
             peers=table,
             key_prefix=options.key_prefix,
-            speed=parse_speed(options.speed),
+            speed=speed,
             log=str(options.log or ""),
             sources={source: content.decode() for source, content in loaded.sources.items()},
             open=tuple(options.listen or ()),

@@ -1,34 +1,28 @@
 """`lapwing schema` and `lapwing certificates`."""
 
 import json
-from enum import Enum
 from pathlib import Path
 from typing import Annotated
 
 import typer
 
 from lapwing.cli.app import app
-from lapwing.cli.output_paths import claim
+from lapwing.cli.output_paths import check_not_dash, claim
 from lapwing.cosim.complete_file import write_text
-
-
-class Kind(Enum):
-    """Kind of TOML file."""
-
-    scene = "scene"
-    airframe = "airframe"
-    gains = "gains"
+from lapwing.dynamics.config_error import ConfigError
 
 
 @app.command()
 def schema(
-    kind: Annotated[Kind, typer.Argument(metavar="KIND", help="kind of file")] = Kind.scene,
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="kind of file: scene, airframe or gains")] = "scene",
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="output file [standard output]")] = None,
 ) -> None:
     """Write a JSON schema with which editors check TOML files."""
     from lapwing.file_schemas.json_schema import SCHEMAS
 
-    text = json.dumps(SCHEMAS[kind.value](), indent=1) + "\n"
+    if kind not in SCHEMAS:
+        raise ConfigError.unknown("KIND", "kind of file", kind, SCHEMAS)
+    text = json.dumps(SCHEMAS[kind](), indent=1) + "\n"
     if out is None:
         typer.echo(text, nl=False)
     else:
@@ -49,6 +43,7 @@ def certificates(
     from lapwing.cosim.access.zenoh_access import VIEWER
     from lapwing.services.security import names
 
+    check_not_dash(folder)
     holders = [*names(), VIEWER]
     make(folder, holders, days)
     typer.echo(f"{folder}: certificates of {', '.join(holders)}; copy to each host only its own; do not commit them")

@@ -136,6 +136,7 @@ def stability(
     """Run numerically hard cases against their error bounds.
 
     Each case is also run with a baseline method that fails it.
+
     Exit codes: 1 a case misses its bound, 2 invalid input.
     """
     from lapwing.studies.stability import stability_command

@@ -31,7 +31,7 @@ def of_array(key: str, path: Path) -> np.ndarray:
 
 
 def of_geotiff(key: str, path: Path, home: Home, points: int, spacing: float) -> np.ndarray:
-    """Return the heights of a GeoTIFF on a square about home, bilinear (theory.md, section 2.9).
+    """Return the heights of a GeoTIFF on a square about home by cubic convolution (theory.md, section 2.9).
 
     Args:
         key: scene key of the file, for messages.
@@ -64,7 +64,7 @@ def of_geotiff(key: str, path: Path, home: Home, points: int, spacing: float) ->
                 dst_crs=east_north,
                 dst_transform=rasterio.transform.from_origin(-edge, edge, spacing, spacing),
                 dst_nodata=np.nan,
-                resampling=Resampling.bilinear,
+                resampling=Resampling.cubic,
                 tolerance=0.0,
             )
             heights = heights[::-1] * file.scales[0] + file.offsets[0]

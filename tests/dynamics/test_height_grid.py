@@ -70,7 +70,7 @@ def test_parabolas_are_reproduced_within_outermost_cells():
 
 @pytest.mark.parametrize("axis", [0, 1])
 def test_height_gradient_and_force_are_continuous_across_cells(axis):
-    """Borders at every sample, at the edge, and at two samples beyond it."""
+    """Borders at every sample, at the edge, and one spacing beyond it."""
     nodes, other = ((COLUMNS, ROWS), (ROWS, COLUMNS))[axis]
     borders = np.arange(nodes[0] - 1.0, nodes[-1] + 1.25, SPACING)
     for border, across in itertools.product(
@@ -84,9 +84,44 @@ def test_height_gradient_and_force_are_continuous_across_cells(axis):
         assert forces[0] == pytest.approx(forces[1], abs=1e-9)
 
 
-def test_surface_is_level_beyond_two_samples_outside():
-    """One sample further it is on the line of the last two."""
-    end = 2.0 * HEIGHTS[3, 8] - HEIGHTS[3, 7] - HEIGHTS[3, 4]
+def level_off(way, spacing):
+    """Return the rise [m] per slope at the edge: the slope decreases linearly to 0 within one spacing."""
+    way = min(way, spacing)
+    return way - 0.5 * way * way / spacing
+
+
+@pytest.mark.parametrize("spacing", [0.5, 30.0])
+def test_plane_levels_off_outside(spacing):
+    rows, columns = spacing * np.mgrid[0:4, 0:5]
+    ground = relief(grid=0.5 * columns - 0.25 * rows, corner=(-2.0 * spacing, -spacing), spacing=spacing)
+    for right, up in itertools.product((0.0, 0.3, 1.0, 1.7, 40.0), repeat=2):
+        x, y = (2.0 + right) * spacing, (2.0 + up) * spacing
+        expected = spacing + 0.5 * level_off(right * spacing, spacing)
+        expected -= 0.5 * spacing + 0.25 * level_off(up * spacing, spacing)
+        assert surface(ground, x, y)[0] == pytest.approx(expected, abs=1e-13)
+        slopes = 0.5 * max(0.0, 1.0 - right), -0.25 * max(0.0, 1.0 - up)
+        assert gradient(ground, x, y) == pytest.approx(slopes, abs=1e-14)
+
+
+def test_paraboloid_levels_off_monotonically_at_corner():
+    """The product of two slopes at the corner levels off, too; the slopes at the edge are those of its last cells."""
+    x, y = COLUMNS, ROWS[:, None]
+    ground = relief(grid=0.05 * x * x - 0.03 * y * y + 0.04 * x * y, corner=CORNER, spacing=SPACING)
+    edge_x, edge_y = 0.05 * (2.0 + 1.5) + 0.04 * 1.5, -0.03 * (1.5 + 1.0) + 0.04 * 2.0
+    corner = 0.05 * 4.0 - 0.03 * 2.25 + 0.04 * 3.0
+    for right, up in itertools.product((0.0, 0.1, 0.25, 0.5, 3.0), repeat=2):
+        far_x, far_y = level_off(right, SPACING), level_off(up, SPACING)
+        expected = corner + edge_x * far_x + edge_y * far_y + 0.04 * far_x * far_y
+        assert surface(ground, 2.0 + right, 1.5 + up)[0] == pytest.approx(expected, abs=1e-14)
+    for way in np.random.default_rng(10).normal(size=(40, 2)).tolist():
+        heights = [surface(GROUND, x, way[1]) for x in np.linspace(2.0, 3.0, 30).tolist()]
+        steps = np.diff([height for height, _ in heights])
+        assert (steps >= -1e-15).all() or (steps <= 1e-15).all()
+
+
+def test_surface_is_level_beyond_one_spacing_outside():
+    """It is half a spacing of the last two samples' line higher than the edge."""
+    end = 1.5 * HEIGHTS[3, 8] - 0.5 * HEIGHTS[3, 7] - HEIGHTS[3, 4]
     for x in (2.5, 3.0, 99.0, 1e300):
         assert surface(GROUND, x, 0.0)[0] == pytest.approx(end, abs=1e-15)
     assert surface(GROUND, 3.0, 3.0)[1] == (-0.0, -0.0, 1.0)

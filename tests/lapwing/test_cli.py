@@ -96,8 +96,14 @@ BAD = {
     ),
     "keys": ([HOVER, "--keys", "x"], "--keys: expected with --listen or --endpoints"),
     "door": ([HOVER, "--listen", "x"], "--listen x: expected an endpoint protocol/address:port"),
-    "option": ([HOVER, "--lgo", "x"], "(see lapwing run --help)"),
-    "no scene": ([], "Missing argument 'SCENE'"),
+    "option": ([HOVER, "--lgo", "x"], "--lgo: unknown option; did you mean --log? (see lapwing run --help)"),
+    "slow": (
+        [HOVER, "--speed", "1e-9"],
+        "--speed 1e-9: a tick of 0.004 s would take over 1 s; expected at least 0.004",
+    ),
+    "slow scene": ([HOVER, "--set", "run.real_time_factor=1e-300"], "run.real_time_factor 1e-300: a tick of 0.004 s"),
+    "dash": ([HOVER, "--json", "-"], "-: standard output is not supported here; expected the path of an output"),
+    "no scene": ([], "SCENE: missing (see lapwing run --help)"),
 }
 
 
@@ -144,7 +150,20 @@ def test_invalid_run_is_rejected_in_one_line(lapwing, arguments, expected):
             ["service", "plant", HOVER, "--endpoints", PEERS, "--key-prefix", "a b"],
             "--key-prefix a b: expected letters",
         ),
-        (["fly"], "No such command 'fly'"),
+        (["protocol", HOVER, "--plot", "a.txt"], "--plot a.txt: unknown format; use a name that ends in .png"),
+        (["protocol", HOVER, "--plot", "a.svg", "--json", "a.svg"], "--plot a.svg: is the same file as --json"),
+        (["campaign", HOVER, "--out", "-"], "-: standard output is not supported here"),
+        (["certificates", "-"], "-: standard output is not supported here"),
+        (["export-library", HOVER, "--out", "-"], "-: standard output is not supported here"),
+        (["campaign", HOVER, "--vary", "vehicle.mas=normal(9,1)"], "--vary vehicle.mas: unknown key 'mas'; did you"),
+        (["fly"], "fly: unknown command (see lapwing --help)"),
+        (["runn"], "runn: unknown command; did you mean run? (see lapwing --help)"),
+        (["new"], "COMMAND: missing (see lapwing new --help)"),
+        (["check", "hover", "more"], "more: unexpected argument (see lapwing check --help)"),
+        (["info", "a.mcap", "--log"], "--log: unknown option (see lapwing info --help)"),
+        (["import", "a.ulg"], "--out: missing (see lapwing import --help)"),
+        (["import", "a.ulg", "--out"], "--out: expected a value (see lapwing import --help)"),
+        (["run", "hover", "--view=1"], "--view: takes no value (see lapwing run --help)"),
     ],
 )
 def test_other_invalid_commands_are_rejected_in_one_line(lapwing, arguments, expected):
@@ -219,6 +238,55 @@ def test_check_prints_configuration(lapwing):
         "  sensors   none",
         "  services  plant, trajectory, autopilot; 250 Hz, gauss_seidel",
     ]
+
+
+@pytest.mark.parametrize(
+    ("option", "value", "message"),
+    [
+        ("--runs", "0", "--runs 0: expected a number from 1 to 10000000"),
+        ("--vary", "vehicle.mass=normal(1", "expected a distribution, normal, uniform"),
+        ("--vary", "vehicle.mass", "--vary vehicle.mass: expected KEY=DISTRIBUTION"),
+        ("--design", "lsh", "design lsh: expected one of random, lhs, sobol, grid"),
+        ("--seed", "0", "seed 0: expected a whole number from 1"),
+        ("--shard", "3/2", "--shard 3/2: expected I/N with I from 1 to N"),
+        ("--sweep", "none.csv", "--sweep none.csv: cannot be read"),
+        ("--workers", "0", "--workers 0: expected at least 1"),
+    ],
+)
+def test_campaign_checks_values_before_slow_imports(option, value, message):
+    command = [sys.executable, "-X", "importtime", "-m", "lapwing", "campaign", "hover", option, value]
+    result = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    lines = result.stderr.splitlines()
+    modules = {line.rpartition("|")[2].strip() for line in lines if line.startswith("import time:")}
+    assert result.returncode == 2
+    assert message in lines[-1]
+    assert not modules & {"numba", "matplotlib", "lapwing.services.scene_resolver", "scipy.stats"}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ("run hover --speed 1e-9", "--speed 1e-9: a tick of 0.004 s would take over 1 s"),
+        ("run hover --mode single-process --json -", "-: standard output is not supported here"),
+        ("schema foo", "KIND: unknown kind of file 'foo'; expected one of airframe, gains, scene"),
+        ("import flight.csv --out a.mcap --mapping m.toml", "--mapping m.toml: tme: unknown key 'tme'; did you mean"),
+        ("import flight.csv --out a.mcap --mapping none.toml", "--mapping none.toml: cannot be read"),
+        ("import flight.csv --out a.mcap --mapping nanobench", "flight.csv: none of the mapped columns"),
+        ("identify hover flight.csv --out a.toml", "--free: missing; name the keys to estimate"),
+        ("identify hover flight.csv --mapping m.toml --free a.b --out a.toml", "--free a.b: no number of this name"),
+    ],
+)
+def test_process_rejects_input_in_one_line_and_writes_no_file(tmp_path, arguments, message):
+    (tmp_path / "m.toml").write_text('[tme]\ncolumn = "t"\nunit = "s"\n')
+    (tmp_path / "flight.csv").write_text("a,b\n1,2\n")
+    command, environment = [sys.executable, "-m", "lapwing", *arguments.split()], os.environ | {"PYTHONPATH": str(ROOT)}
+    result = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300, check=False
+    )
+    assert (result.returncode, result.stdout, result.stderr.count("\n")) == (2, "", 1)
+    assert message in result.stderr
+    assert sorted(os.listdir(tmp_path)) == ["flight.csv", "m.toml"]
 
 
 def test_command_shows_no_traceback():

@@ -17,7 +17,8 @@ def test_schema_is_json(lapwing, tmp_path, kind):
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        (["scnee"], "'scnee' is not one of 'scene', 'airframe', 'gains'"),
+        (["scnee"], "KIND: unknown kind of file 'scnee'; did you mean scene? expected one of airframe, gains, scene"),
+        (["--out", "-"], "-: standard output is not supported here; expected the path of an output"),
         (["--out", "none/page.json"], "none/page.json: cannot be written"),
     ],
 )

@@ -36,11 +36,15 @@ def _cubic(a, b, c, d, p):
 
 @kernel
 def _between(t, x, y):
-    """Return (height, slope along x, slope along y) of the grid by cubic convolution (theory.md, eq. (2.82))."""
+    """Return (height, slope along x, slope along y) of the grid by cubic convolution (theory.md, eq. (2.82)).
+
+    Outside, the slope at the edge decreases linearly to 0 within one spacing.
+    """
     rows, columns = t.grid.shape
-    # the border is level; this order of arguments maps NaN to 1
-    u = min(max(1.0, (x - t.corner[0]) / t.spacing), columns - 3.0)
-    v = min(max(1.0, (y - t.corner[1]) / t.spacing), rows - 3.0)
+    column, row = (x - t.corner[0]) / t.spacing, (y - t.corner[1]) / t.spacing
+    # nearest place in the grid, and the way from there in spacings; this order of arguments maps NaN to the edge
+    u, v = min(max(2.0, column), columns - 3.0), min(max(2.0, row), rows - 3.0)
+    out_x, out_y = min(max(-1.0, column - u), 1.0), min(max(-1.0, row - v), 1.0)
     i, j, g = int(v), int(u), t.grid
     p, q = u - j, v - i
     a, along_a = _cubic(g[i - 1, j - 1], g[i - 1, j], g[i - 1, j + 1], g[i - 1, j + 2], p)
@@ -48,7 +52,13 @@ def _between(t, x, y):
     c, along_c = _cubic(g[i + 1, j - 1], g[i + 1, j], g[i + 1, j + 1], g[i + 1, j + 2], p)
     d, along_d = _cubic(g[i + 2, j - 1], g[i + 2, j], g[i + 2, j + 1], g[i + 2, j + 2], p)
     height, across = _cubic(a, b, c, d, q)
-    return height, _cubic(along_a, along_b, along_c, along_d, q)[0] / t.spacing, across / t.spacing
+    along, twist = _cubic(along_a, along_b, along_c, along_d, q)
+    far_x, far_y = out_x - 0.5 * out_x * abs(out_x), out_y - 0.5 * out_y * abs(out_y)
+    return (
+        height + along * far_x + across * far_y + twist * far_x * far_y,
+        (along + twist * far_y) * (1.0 - abs(out_x)) / t.spacing,
+        (across + twist * far_x) * (1.0 - abs(out_y)) / t.spacing,
+    )
 
 
 @kernel
@@ -211,7 +221,7 @@ def ray(t, origin, direction, longest):
     return after if after <= longest else math.inf
 
 
-BORDER = 4  # samples outside the edge of a grid: one on the line of the last two, then level ground
+BORDER = 2  # samples outside the edge of a grid: one on the line of the last two, and one without influence
 FINEST = 0.02  # [m] a ray may miss narrower objects
 CAUTION = 0.25  # step of the march relative to the gap under the ray
 HALVINGS = 50

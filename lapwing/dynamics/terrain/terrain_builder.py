@@ -47,8 +47,8 @@ def relief(
     """
     heights, highest, grid_slope = np.zeros((0, 0)), 0.0, 0.0
     if grid is not None:
-        heights = _with_border(_validate_grid(grid, corner, spacing))
-        highest, grid_slope = _bounds(heights, spacing)
+        samples = _validate_grid(grid, corner, spacing)
+        heights, (highest, grid_slope) = _with_border(samples), _bounds(samples, spacing)
         corner = (corner[0] - BORDER * spacing, corner[1] - BORDER * spacing)
     steep = math.hypot(*slope) + abs(bump_height) * 2.0 * math.pi / bump_length
     if steep > STEEPEST:
@@ -92,17 +92,19 @@ def _validate_grid(grid: np.ndarray, corner: tuple[float, float], spacing: float
 
 
 def _with_border(heights: np.ndarray) -> np.ndarray:
-    """Return the heights with samples outside: one on the line of the last two, then level ground."""
+    """Return the heights with `BORDER` samples outside, which make the slopes at the edge one-sided differences."""
     return np.pad(np.pad(heights, 1, "reflect", reflect_type="odd"), BORDER - 1, "edge")
 
 
 def _bounds(heights: np.ndarray, spacing: float) -> tuple[float, float]:
-    """Return bounds of the height [m] and the slope of the bicubic surface: those of its Bezier points."""
+    """Return bounds of the height [m] and the slope of the surface: those of the Bezier points of its cells."""
     points = heights
     for axis in (0, 1):
-        third = np.gradient(points, axis=axis) / 3.0
-        shape = [n * (3 if k == axis else 1) for k, n in enumerate(points.shape)]
-        points = np.stack((points - third, points, points + third), axis=axis + 1).reshape(shape)
+        samples = np.moveaxis(points, axis, 0)
+        slopes = np.gradient(samples, axis=0)
+        cells = np.stack((samples - slopes / 3.0, samples, samples + slopes / 3.0), axis=1)
+        first, last = samples[:1] - 0.5 * slopes[:1], samples[-1:] + 0.5 * slopes[-1:]  # level ground outside
+        points = np.moveaxis(np.concatenate((first, cells.reshape(-1, samples.shape[1]), last)), 0, axis)
     along, across = (3.0 * float(np.abs(np.diff(points, axis=axis)).max()) / spacing for axis in (1, 0))
     return float(points.max()), math.hypot(along, across)
 
