@@ -67,7 +67,8 @@ def uncompiled(monkeypatch: pytest.MonkeyPatch) -> None:
     """Run kernels that Python calls as Python functions, for tests that evaluate them too seldom to compile them.
 
     The results are bit-for-bit those of compiled kernels (`test_uncompiled_plant_equals_compiled_plant`). Random
-    numbers, whose integers overflow, and the blocks of a flight stay compiled.
+    numbers, whose integers overflow, and the blocks of a flight stay compiled. Kernels that use vector registers, such
+    as those of ground contact, have no form in Python.
     """
     dispatcher = decorators._Dispatcher
     compiled = dispatcher.__call__
