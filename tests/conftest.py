@@ -1,9 +1,14 @@
-"""Start long files first, so that no worker runs one alone at the end; report the peak memory."""
+"""Order of the files, peak memory of the workers, and kernels without compilation.
+
+Long files start first, so that no worker runs one alone at the end.
+"""
 
 import resource
 
 import hypothesis
 import pytest
+
+from lapwing.kernels.compiler import decorators
 
 SLOWEST = (  # minutes each
     "test_readme.py",
@@ -55,3 +60,22 @@ def pytest_terminal_summary(terminalreporter) -> None:
     """Print the peak memory of each process."""
     peaks = terminalreporter.config.stash[_peaks]
     terminalreporter.write_line(f"peak memory: {', '.join(f'{k} {v:.0f} MB' for k, v in sorted(peaks.items()))}")
+
+
+@pytest.fixture
+def uncompiled(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Run kernels that Python calls as Python functions, for tests that evaluate them too seldom to compile them.
+
+    The results are bit-for-bit those of compiled kernels (`test_uncompiled_plant_equals_compiled_plant`). Random
+    numbers, whose integers overflow, and the blocks of a flight stay compiled. Kernels that use vector registers, such
+    as those of ground contact, have no form in Python.
+    """
+    dispatcher = decorators._Dispatcher
+    compiled = dispatcher.__call__
+
+    def call(self, *arguments, **named):
+        if self.py_func.__module__.startswith(("lapwing.dynamics.noise", "lapwing.cosim.")):
+            return compiled(self, *arguments, **named)
+        return self.py_func(*arguments, **named)
+
+    monkeypatch.setattr(dispatcher, "__call__", call, raising=False)

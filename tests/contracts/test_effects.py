@@ -157,6 +157,20 @@ def test_all_effects_at_once_fly():
     assert [len(memory) > 0 for memory in state.memory].count(True) >= 6
 
 
+UNCOMPILED = (  # effects whose tests use the fixture `uncompiled`
+    "air_density", "axial_inflow", "body_drag", "ceiling_effect", "dc_motor", "downwash", "gravity_altitude",
+    "gyroscopic_torque", "multirotor_ground_effect", "rotor_thrust",
+)  # fmt: skip
+
+
+@pytest.mark.long
+def test_uncompiled_plant_equals_compiled_plant(request):
+    tables = {name: FREE.get(name, {}) for name in UNCOMPILED}
+    compiled = fly(tables, seconds=0.008, height=0.5)
+    request.getfixturevalue("uncompiled")
+    assert fly(tables, seconds=0.008, height=0.5) == compiled
+
+
 def test_effects_are_independent_of_table_order():
     one = effects.from_scene(ALL, DRONE)
     assert one == effects.from_scene(dict(reversed(ALL.items())), DRONE)
@@ -204,6 +218,7 @@ def test_absent_effects_change_no_bit():
     assert not math.isclose(state.motion.omega_body[0], 0.0)
 
 
+@pytest.mark.long
 def test_step_takes_time_of_hand_written_step():
     """Compare the processor time with that of the loop above, as minima over alternating short runs."""
     p = multirotor.parameters(DRONE, effects.from_scene({"gravity": {}, "rotor_thrust": {}}, DRONE))

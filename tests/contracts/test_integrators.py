@@ -180,7 +180,7 @@ RATES.update({CountingNumberParameters: counting_number_rate, CountingBodyParame
 
 
 @pytest.mark.parametrize("name", [n for n in integrators.names() if hasattr(integrators.get(n), "EVALUATIONS")])
-def test_evaluations_equal_declared_count(name):
+def test_evaluations_equal_declared_count(name, uncompiled):
     method, (body, start), count = integrators.get(name), BODY, np.zeros(1, dtype=np.int64)
     on_body = hasattr(method, "incompatibility")
     p = CountingBodyParameters(body.inertia, count) if on_body else CountingNumberParameters(count)

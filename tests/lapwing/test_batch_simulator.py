@@ -133,6 +133,7 @@ def test_body_rates_are_followed_and_thrust_holds_weight():
     assert abs(end.velocity_world[3, 2]) < 0.5
 
 
+@pytest.mark.long
 def test_body_rate_control_equals_voltages_computed_in_numpy():
     """The reference in numpy: torque, allocation by least squares, inverse of thrust = k speed^2, speed = u KV."""
     one, other = (lapwing.BatchSimulator("hover", 3) for _ in range(2))

@@ -68,7 +68,7 @@ def test_run_names_log_of_run_that_has_only_claimed_its_report(tmp_path):
 
 def test_simultaneous_runs_write_separate_logs(tmp_path):
     options = ["--mode", "single-process", "--set", "run.duration=1.0"]
-    runs = [start(tmp_path, "run", SCENE, *options, "--set", f"run.seed={seed}") for seed in (1, 2, 3)]
+    runs = [start(tmp_path, "run", SCENE, *options, "--set", f"run.seed={seed}") for seed in (1, 2)]
     for run in runs:
         assert run.communicate()[1] == ""
     logs = sorted((tmp_path / "recordings").glob("*.mcap"))
@@ -78,7 +78,7 @@ def test_simultaneous_runs_write_separate_logs(tmp_path):
             assert log.complete
             assert log.digest() == log.metadata["digest"]
             seeds.add(log.metadata["seed"])
-    assert seeds == {"1", "2", "3"}
+    assert seeds == {"1", "2"}
 
 
 def test_claimed_report_json_and_export_are_rejected_by_name(tmp_path):

@@ -6,6 +6,8 @@ from lapwing.dynamics.effects.air_density import air_density, tangent
 from lapwing.dynamics.environment import STANDARD, Environment
 from lapwing.dynamics.geodesy import Home
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 HIGH = Environment(home=Home(46.0, 11.0, 800.0), atmosphere=Atmosphere(100_000.0, -10.0))
 
 

@@ -16,6 +16,8 @@ from lapwing.dynamics.vehicles.airframe import Airframe
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, MultirotorDrive, evaluate
 from lapwing.kernels import python_function
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 SPEED = (310.0, 290.0, 330.0, 270.0)  # [rad/s]
 VOLTAGE = (33.0, 29.0, 31.0, 30.0)  # [V], so that the rotors speed up and slow down
 AXES = ((0.3, 0.1, 1.0), (-0.2, 0.3, 2.0), (0.0, -0.5, 1.0), (0.1, 0.1, 0.9))

@@ -11,6 +11,8 @@ from lapwing.dynamics.effects.rotor_thrust import rotor_thrust
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 
 def both(drone, s):
     inflow, thrust = effects.from_scene({"rotor_thrust": {}, "axial_inflow": {}}, drone)

@@ -5,6 +5,8 @@ from effects_helpers import rotation_of
 from lapwing.dynamics import effects
 from lapwing.dynamics.effects.body_drag import body_drag
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 
 def drag_world(drone, s, rotors, **table):
     (e,) = effects.from_scene({"body_drag": table}, drone)

@@ -10,6 +10,8 @@ from scipy.optimize import brentq
 from lapwing.dynamics import effects
 from lapwing.dynamics.effects.ceiling_effect import ceiling_effect, low
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 R = 0.2794  # [m]
 CEILING = 20.0  # [m]
 

@@ -14,6 +14,8 @@ from lapwing.dynamics.vehicles.inflow import thrust_in_wake
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, evaluate
 from lapwing.kernels import python_function
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 share = python_function(thrust_in_wake)
 GAP = 0.10  # [m]
 

@@ -7,6 +7,8 @@ from lapwing.dynamics import effects
 from lapwing.dynamics.effects._types import Rotors
 from lapwing.dynamics.effects.dc_motor import continue_current, dc_motor
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 K, R = 0.0954929658551372, 0.085  # 60 / (2 pi 150) / (2/3)
 
 

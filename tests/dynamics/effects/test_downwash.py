@@ -11,6 +11,8 @@ from lapwing.dynamics.effects._vehicle_interaction import NeighbourState
 from lapwing.dynamics.effects.downwash import wind_of_jets
 from lapwing.dynamics.vehicles.airframe import load_airframe
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 ROOT = Path(__file__).parents[3]
 QUAD = load_airframe(ROOT / "lapwing/scenes/vehicles/quad_x.toml")
 WASH = from_scene({"downwash": {}}, QUAD)[0]

@@ -12,6 +12,8 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects.dynamic_inflow import dynamic_inflow, follow
 from lapwing.dynamics.effects.rotor_thrust import rotor_thrust
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 SPEED, DENSITY = 300.0, 1.2
 
 

@@ -5,6 +5,8 @@ from effects_helpers import NO_FACTORS
 from lapwing.dynamics import effects
 from lapwing.dynamics.effects.ground_effect import gain, ground_effect, high
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 RADIUS = 0.2794
 
 

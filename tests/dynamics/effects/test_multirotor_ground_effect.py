@@ -11,6 +11,8 @@ from lapwing.dynamics.effects.multirotor_ground_effect import high, multirotor_g
 from lapwing.dynamics.environment import STANDARD
 from lapwing.dynamics.terrain import relief
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 R, D = 0.2794, 2 * 0.35171491  # radius, distance of adjacent axes [m]
 B = math.sqrt(2) * D
 TOP = 100.0  # [m] of a table in the air: the ground below it is out of reach

@@ -10,6 +10,8 @@ from lapwing.dynamics import effects
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects.rotor_table import embed, rotor_table
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 SPEED, D = 300.0, 0.5588
 N = SPEED / (2 * math.pi)
 UIUC = "J CT CP eta\n0.000  0.1000  0.0400  0.000\n0.200  0.0800  0.0380  0.421\n0.400  0.0500  0.0300  0.667"

@@ -6,6 +6,8 @@ from lapwing.dynamics import effects
 from lapwing.dynamics.effects.wind_constant import WindConstant, wind_constant
 from lapwing.dynamics.vehicles import multirotor
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 
 def test_uniform_wind_is_added(situation):
     s = situation(wind=(1, 0, 0), density=1.1)

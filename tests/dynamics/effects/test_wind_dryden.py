@@ -44,7 +44,7 @@ def test_scales_and_intensities(drone):
 
 
 @pytest.mark.parametrize("slope", [0.0, 0.2])
-def test_turbulence_follows_height_and_airspeed(drone, situation, rotors, slope):
+def test_turbulence_follows_height_and_airspeed(drone, situation, rotors, slope, uncompiled):
     """The spectra equal those at a given height and airspeed."""
     around = Environment(terrain=relief(slope=(slope, 0.0)))
     (follows,) = effects.from_scene({"wind_dryden": {"wind_speed": 7.0}}, drone, around)

@@ -11,6 +11,8 @@ from hypothesis import strategies as st
 from lapwing.dynamics.lie import quaternion as q
 from lapwing.dynamics.vector import apply
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 angle = st.floats(-3.1, 3.1)
 vector = st.tuples(st.floats(-3, 3), st.floats(-3, 3), st.floats(-3, 3))
 mpmath.mp.dps = 50

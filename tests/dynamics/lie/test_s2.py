@@ -8,6 +8,8 @@ from lapwing.dynamics.lie import s2, so3
 from lapwing.dynamics.lie.s2 import Direction
 from lapwing.dynamics.vector import apply, cross, dot, scale
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 NORTH = Direction(0.0, 0.0, 1.0)
 
 

@@ -9,6 +9,8 @@ import pytest
 from lapwing.dynamics import vector
 from lapwing.dynamics.lie import quaternion, se3
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 mpmath.mp.dps = 60
 
 V = ((0.5, -0.2, 0.9), (0.3, -1.1, 0.7))

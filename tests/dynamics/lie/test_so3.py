@@ -9,6 +9,8 @@ import pytest
 from lapwing.dynamics.lie import quaternion, so3
 from lapwing.dynamics.lie.so3 import Rotation
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 mpmath.mp.dps = 50
 
 ANGLES = [1e-12, 1e-9, 1e-6, 1e-3, 0.2499, 0.2501, 0.9, 0.9999, 1.0001, 2.0, math.pi - 1e-9, math.pi, math.pi + 1e-7]

@@ -7,6 +7,8 @@ from lapwing.dynamics.lie import se3, so3, ts2
 from lapwing.dynamics.lie.ts2 import Swing
 from lapwing.dynamics.vector import cross, dot
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 X = ts2.normalise(Swing((0.3, -0.5, 0.9), (1.0, 0.4, 0.2)))
 MU = ((0.3, -1.1, 0.7), (0.5, 0.2, -0.9))
 

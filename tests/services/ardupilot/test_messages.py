@@ -12,6 +12,8 @@ from lapwing.services.ardupilot.frame_sequence import Frame, FrameSequence
 from lapwing.services.ardupilot.servo_packet import decode, throttle
 from lapwing.services.ardupilot.state_message import INVALID, Extras, VehicleState, write_state
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 
 def packet(count=1, pwm=(1000,) * 16, magic=18458, rate=1200):
     return struct.pack(f"<HHI{len(pwm)}H", magic, rate, count, *pwm)

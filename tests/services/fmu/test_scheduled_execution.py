@@ -84,9 +84,14 @@ def run_command(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run([sys.executable, "-m", "lapwing", *arguments], capture_output=True, text=True, check=False)
 
 
-def fly(folder: Path) -> subprocess.CompletedProcess[str]:
+def write_scene(folder: Path) -> Path:
     scene = folder / "clocks.toml"
     scene.write_text(HOVER.read_text() + SERVICE)
+    return scene
+
+
+def fly(folder: Path) -> subprocess.CompletedProcess[str]:
+    scene = write_scene(folder)
     options = ["--mode", "single-process", "--set", "run.duration=0.4", "--set", "success.require=[]"]
     return run_command("run", str(scene), "--allow-code", "--log", str(folder / "a.mcap"), *options)
 
@@ -133,8 +138,7 @@ def test_clock_that_cannot_tick_is_rejected_by_name(tmp_path: Path, periodic: st
 
 def test_clock_with_ticks_of_its_own_is_no_input(tmp_path: Path) -> None:
     write_clock_fmu(tmp_path / "clocks.fmu")
-    scene = tmp_path / "clocks.toml"
-    fly(tmp_path)
+    scene = write_scene(tmp_path)
     scene.write_text(scene.read_text().replace("triggered = ", "periodic = "))
     done = subprocess.run(
         [sys.executable, "-m", "lapwing", "check", str(scene)], capture_output=True, text=True, check=False

@@ -11,6 +11,8 @@ from lapwing.services.sensors import imu, magnetometer, registry
 from lapwing.services.sensors.fault_schedule import compile_faults
 from lapwing.services.sensors.sensor_inputs import Truth
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 TICK = 0.1  # [s]
 
 
@@ -74,7 +76,6 @@ def test_spikes_have_stated_probability_and_size():
     assert np.std((error[10:] - np.arange(10.0, 2000.0))[hit]) == pytest.approx(50.0, rel=0.15)
 
 
-@pytest.mark.long
 def test_fault_affects_only_its_channel():
     readings = fly({"kind": "bias", "channel": "gyro", "size": 1.0}, sensor="imu")
     assert readings[15].omega_body == (16.0, 1.0, 1.0)

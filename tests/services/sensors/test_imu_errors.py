@@ -19,6 +19,8 @@ from lapwing.services.sensors.rotor_vibration import Damage, RotorVibration
 from lapwing.services.sensors.sensor_inputs import Truth
 from lapwing.services.sensors.triad import CrossCoupling
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 KEY = stream_key(3, "drone1", "imu")
 G0 = 9.80665
 REST = Truth(ZERO, NO_ROTATION, ZERO, ZERO, ZERO, 2.0, G0, *STANDARD[:2], STANDARD.magnetic_field_world)
@@ -77,14 +79,12 @@ def test_filter_response_equals_transfer_function():
         assert gain * np.exp(1j * phase) == pytest.approx(expected, abs=1e-12)
 
 
-@pytest.mark.long
 def test_filter_delays_slow_motion_by_its_group_delay():
     p = imu.Imu(rate=250.0, gyro_filter=LowPass(98.0, 2.8e-3))
     ramp = 3.0 * np.arange(400) / p.rate
     np.testing.assert_allclose(readings(p, spin=ramp)[200:, 2], ramp[200:] - 3.0 * 2.8e-3, atol=1e-12)
 
 
-@pytest.mark.long
 def test_cross_coupling_matrix_and_g_sensitivity_of_gyro():
     rows = (1.01, 0.002, 0.0, -0.003, 1.0, 0.0, 0.0, 0.004, 0.99)
     p = imu.Imu(cross_coupling=CrossCoupling(gyro_matrix=rows))

@@ -26,6 +26,8 @@ from lapwing.services.sensors import airspeed, barometer, gps, imu, magnetometer
 from lapwing.services.sensors.registry import parameters
 from lapwing.services.sensors.sensor_inputs import Truth
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 KEY = stream_key(7, "drone1", "test")
 G = 9.81
 FIELD = STANDARD.magnetic_field_world
@@ -43,7 +45,6 @@ def read(module, p, *truths):
     return reading
 
 
-@pytest.mark.long
 def test_imu_reads_g_at_rest_and_zero_in_free_fall():
     assert read(imu, imu.Imu(), truth()).specific_force_body == (0.0, 0.0, G)
     assert read(imu, imu.Imu(), truth(acceleration=(0.0, 0.0, -G))).specific_force_body == (0.0, 0.0, 0.0)
@@ -60,7 +61,6 @@ def test_imu_measures_in_body_frame():
     np.testing.assert_allclose(ahead.specific_force_body, (2.0, 0.0, G), atol=1e-12)
 
 
-@pytest.mark.long
 def test_imu_saturates_and_rounds():
     p = imu.Imu(imu.Gyro(range_dps=100.0, resolution_dps=0.5), imu.Accelerometer(range_g=2.0, resolution_mg=1.0))
     reading = read(
@@ -108,7 +108,6 @@ def test_barometer_reads_pressure_law_and_falls_with_height():
     assert high.pressure - low.pressure == pytest.approx(-1.19 * 9.81 * 10.0, rel=0.02)
 
 
-@pytest.mark.long
 def test_gps_position_is_delayed_by_latency():
     p = gps.Gps(latency_samples=2)
     path = [truth(position=(float(k), 2.0 * k, 0.5 * k), velocity=(10.0 * k, 0.0, 0.0)) for k in range(6)]
@@ -158,7 +157,6 @@ def test_sonar_range_by_height_and_tilt(height, tilt_deg, expected):
     assert reading.valid
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(("slope_deg", "tilt_deg"), [(20.0, 0.0), (20.0, 20.0), (20.0, -4.0), (8.0, 0.0), (20.0, -6.0)])
 def test_sonar_reads_nearest_ground_of_slope(slope_deg, tilt_deg):
     """The nearest ground within the beam: across the slope 2 m cos(slope), at slope - tilt from the beam's axis."""
@@ -184,7 +182,6 @@ def test_sonar_sees_box_and_next_tread_of_stair():
     ]
 
 
-@pytest.mark.long
 def test_accelerometers_off_centre_measure_rotation():
     """On a wheel of 0.3 m radius with 2 rad/s and 5 rad/s^2: w^2 r inwards, a r tangentially."""
     p = imu.Imu(position=(0.3, 0.0, 0.0))
@@ -193,7 +190,6 @@ def test_accelerometers_off_centre_measure_rotation():
     assert read(imu, imu.Imu(), spinning).specific_force_body == (0.0, 0.0, G)
 
 
-@pytest.mark.long
 def test_gps_measures_at_antenna():
     """0.4 m ahead on a vehicle with heading north and 1 rad/s to the left: 0.4 m north, 0.4 m/s to the west."""
     p = gps.Gps(antenna=(0.4, 0.0, 0.1))
@@ -207,7 +203,6 @@ def test_gps_measures_at_antenna():
     np.testing.assert_allclose(reading.velocity_world, (4.6, 0.0, 0.0), atol=1e-12)
 
 
-@pytest.mark.long
 def test_gps_has_no_fix_under_roof():
     p = gps.Gps(outages=(gps.Outage(10.0, 0.0, 3.0), gps.Outage(0.0, 20.0, 1.0)))
     places = [(0.0, 0.0), (7.1, 0.0), (6.9, 0.0), (10.0, 2.9), (0.0, 20.5), (0.0, 18.9)]
@@ -291,7 +286,6 @@ def test_rangefinder_in_any_direction_over_level_ground(azimuth, elevation, expe
     assert read(rangefinder, p, place).range == pytest.approx(expected)
 
 
-@pytest.mark.long
 def test_rangefinder_ahead_sees_wall_and_its_limits():
     """A box 4 m ahead of a level ray; +inf for other directions and beyond the range, -inf below the minimum."""
     wall = relief(boxes=[(6.0, 0.0, 4.0, 4.0, 0.0, 5.0)])
@@ -321,7 +315,6 @@ def test_optical_flow_of_rotation_is_body_rate():
     assert reading.flow == reading.rate == (0.3, -0.2)
 
 
-@pytest.mark.long
 def test_optical_flow_over_moving_ground():
     """By geometry: the body rate that moves the image of the point on the axis at the same speed."""
     attitude, velocity = from_roll_pitch_yaw(0.2, -0.1, 1.3), np.array([2.0, -1.0, 0.5])
@@ -383,7 +376,6 @@ def test_delta_angles_of_coning_restore_attitude():
     assert ends[False] > 0.02
 
 
-@pytest.mark.long
 def test_integrated_readings_restore_velocity_at_imu():
     """The sum of R_before f / rate - g t is the change of v + R (omega x r), of a turning, accelerating body."""
     rate, place = 100.0, (0.2, -0.1, 0.05)
@@ -403,7 +395,6 @@ def test_integrated_readings_restore_velocity_at_imu():
     np.testing.assert_allclose(gained, speeds[1] - speeds[0], atol=1e-12)
 
 
-@pytest.mark.long
 def test_rotor_vibration_is_aliased_and_integration_attenuates():
     """251 Hz sampled at 250 Hz appears as 1 Hz; the mean over a sample attenuates it by sin(x)/x, x = pi 251/250."""
     speed = 2.0 * math.pi * 251.0
@@ -445,7 +436,6 @@ def test_gps_dilution_of_precision_by_published_geometries():
 STREET = tuple(gps.Satellite(a, e) for a, e in ((10.0, 60.0), (170.0, 50.0), (20.0, 30.0), (200.0, 70.0), (95.0, 80.0)))
 
 
-@pytest.mark.long
 def test_gps_errors_have_covariance_of_satellites_in_view():
     """Against least squares with rows (east, north, up, 1) over 1500 receivers, and against the published variance."""
     p = gps.Gps(sky=STREET, range_correlated_error=2.0, range_noise_m_per_sqrt_hz=0.5)

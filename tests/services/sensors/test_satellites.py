@@ -23,6 +23,8 @@ from lapwing.services.sensors.satellites import Constellation
 from lapwing.services.sensors.sensor_inputs import Truth
 from lapwing.studies.flight_data import FlightData
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 KEY, HOME = stream_key(7, "drone1", "gps"), STANDARD.home
 GALILEO = Constellation()
 
@@ -87,7 +89,6 @@ def test_constellation_repeats_after_stated_17_revolutions_in_10_days():
     assert np.degrees(np.arccos(np.clip((first * again).sum(axis=1), -1.0, 1.0))).max() < 1.0
 
 
-@pytest.mark.long
 def test_dilution_over_a_day_is_that_of_full_constellation():
     """At least 6 satellites, PDOP below 6: the bound that the GPS and Galileo performance standards use."""
     p = gps.Gps(constellation=GALILEO._replace(mask_deg=5.0), rate=1.0 / 600.0)
@@ -140,7 +141,6 @@ def test_position_jumps_when_visible_satellites_change():
     assert steps[~changes].max() < 0.05
 
 
-@pytest.mark.long
 def test_building_hides_satellites_behind_it():
     """North of a wide, high box only satellites above its edge or in the northern half are visible."""
     block = relief(boxes=[(0.0, -60.0, 400.0, 100.0, 0.0, 60.0)])
@@ -208,7 +208,6 @@ def test_long_range_of_satellite_overhead_lowers_fix():
         assert np.dot(fix.error, d[k]) < 0.0
 
 
-@pytest.mark.long
 def test_multipath_moves_fix_near_walls_only():
     street = relief(boxes=[(0.0, 14.0, 80.0, 8.0, 0.0, 20.0)])
     clean = gps.Gps(constellation=GALILEO)
@@ -225,7 +224,6 @@ def test_time_to_first_fix_is_stated_value():
     assert [r.valid for r in result] == [k >= 26 for k in range(40)]
 
 
-@pytest.mark.long
 def test_rtk_solution_converges_and_falls_back():
     """Fixed; single when corrections are older than 2 s; float for 3 s, then fixed; errors in the stated ratios."""
     rtk = Rtk(20.0, 100.0, 3.0, 5, 2.0, (Gap(1.0, 5.0),))
@@ -243,7 +241,6 @@ def test_rtk_solution_converges_and_falls_back():
     assert all(r.valid for r in result)
 
 
-@pytest.mark.long
 def test_rtk_is_float_with_few_satellites():
     p = gps.Gps(constellation=GALILEO, rtk=Rtk(satellites_min=24), fix_status=2)
     assert {r.fix for r in readings(p, 5)[1:]} == {GPS_FLOAT}

@@ -12,6 +12,8 @@ from lapwing.dynamics.terrain.ray_casting import as_relief, cast, steepness
 from lapwing.services.sensors import depth_camera, lidar, scan
 from lapwing.studies.flight_data import FlightData
 
+pytestmark = pytest.mark.usefixtures("uncompiled")
+
 OBSTACLES = relief(
     slope=(0.1, -0.05),
     boxes=[(6.0, 1.0, 2.0, 3.0, 0.7, 2.5), (-5.0, -4.0, 1.0, 1.0, 0.0, 4.0)],
