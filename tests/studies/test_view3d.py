@@ -15,10 +15,11 @@ from lapwing.services.common.mesh_schema import pack
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.flight_data import FlightData
 from lapwing.studies.flight_provenance import Origin
+from lapwing.studies.plan_shapes import FenceShape
 from lapwing.studies.report import write
 from lapwing.studies.topic_view import TopicView
 from lapwing.studies.view3d import headless as chromium
-from lapwing.studies.view3d import sampling, solids, vehicle_bodies
+from lapwing.studies.view3d import sampling, solids, surroundings, vehicle_bodies
 from lapwing.studies.view3d.coloured_mesh import coloured_mesh
 from lapwing.studies.view3d.live_trail import LINES, POINTS, LiveTrail
 from lapwing.studies.view3d.local_server import run_server
@@ -27,7 +28,6 @@ from lapwing.studies.view3d.rotors import Rotors
 from lapwing.studies.view3d.samples import sample
 from lapwing.studies.view3d.sampling import along, dashes, thin_path
 from lapwing.studies.view3d.stage import Vehicle, error_colours, reach
-from lapwing.studies.view3d.surroundings import add_surroundings
 from lapwing.studies.view3d.vehicle_bodies import motion
 from tests.golden.digests import sample_file
 
@@ -298,7 +298,7 @@ def test_terrain_of_grid_is_drawn_at_its_heights():
     grid = {"spacing": 10.0, "corner": [-20.0, -20.0], "heights": heights.tolist()}
     scene = {"airframe": AIRFRAME, "environment": {"terrain": {"grid": grid}}}
     recorder = Recorder()
-    add_surroundings(recorder, flight(scene=scene))
+    surroundings.add_surroundings(recorder, flight(scene=scene))
     (node,) = (node for node in recorder.nodes.values() if node.kind == "add_mesh_simple")
     assert node.cast_shadow is False  # shadows on itself
     vertices = node.arguments[0]
@@ -310,6 +310,23 @@ def test_terrain_of_grid_is_drawn_at_its_heights():
     rows = {tuple(row) for row in np.asarray(vertices, np.float32)[:, :2].tolist()}
     assert {tuple(end) for end in lines[:, :, :2].reshape(-1, 2).tolist()} < rows  # between the points of the surface
     assert lines[:, :, 2].max() == pytest.approx(0.02, abs=0.01)
+
+
+def test_fence_is_drawn_as_lines_up_to_flight_height(monkeypatch):
+    """A translucent wall hid the ground behind it."""
+    square = np.array([[-5.0, -5.0], [5.0, -5.0], [5.0, 5.0], [-5.0, 5.0]])
+    monkeypatch.setattr(
+        surroundings, "fence_shapes", lambda flight: [FenceShape(True, square), FenceShape(False, square)]
+    )
+    recorder, values = Recorder(), flight()
+    surroundings.add_surroundings(recorder, values)
+    segments, colours = recorder.nodes["/surroundings/fence"].arguments[:2]
+    assert segments.shape == colours.shape == (2 * (3 * 4 + 4), 2, 3)
+    lengths = np.linalg.norm(segments[:, 1] - segments[:, 0], axis=1)
+    assert np.isclose(lengths, 10.0).sum() == 2 * 3 * 4
+    assert segments[..., 2].max() >= max(12.0, values.truth.position[:, 2].max())
+    assert len(np.unique(colours.reshape(-1, 3), axis=0)) == 2
+    assert not [node for node in recorder.nodes.values() if node.kind == "add_mesh_simple"]
 
 
 def test_node_is_sent_only_when_it_changes():

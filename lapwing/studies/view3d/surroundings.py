@@ -18,9 +18,10 @@ SOIL, LINE, WIDE_LINE = (214, 219, 215), (190, 197, 193), (160, 168, 164)
 OBSTACLE, EARTH = "#AEB9C2", "#B9C2B4"
 DAYLIGHT = 2.4  # intensity of the light from the sky, in addition to the sun
 POINTS = 81  # points of the terrain along each side
-EVERY, LIFT = 8, 0.02  # points of the terrain between two grid lines; [m] height of the lines above it
+EVERY, LIFT = 8, 0.02  # points of the terrain between two grid lines; [m] height of lines above the ground
 MARGIN = 30.0  # [m] width of the terrain around the flight
-FENCE_HEIGHT = 12.0  # [m] height of the drawn walls
+FENCE_HEIGHT = 12.0  # [m] minimum height of a drawn fence
+POSTS = 16  # maximum number of posts of a fence
 
 
 def add_ground(scene: Any, low: float) -> None:
@@ -65,7 +66,10 @@ def add_surroundings(scene: Any, flight: FlightData) -> None:
         lines = _relief_lines(relief_solid.vertices.reshape(POINTS, POINTS, 3))
         scene.add_line_segments("/surroundings/lines", lines, WIDE_LINE, thickness=1.0, thickness_units="screen")
     add_ground(scene, low)
-    solids += [*_fence(flight), *_plan(flight)]
+    segments, colours = _fence(flight)
+    if len(segments):
+        scene.add_line_segments("/surroundings/fence", segments, colours, thickness=2.0, thickness_units="screen")
+    solids += _plan(flight)
     for k, solid in enumerate(merge(solids)):
         add_solid(scene, f"/surroundings/{k}", solid)
 
@@ -121,14 +125,23 @@ def _relief_lines(points: np.ndarray) -> np.ndarray:
     return np.concatenate(pairs).astype(np.float32)
 
 
-def _fence(flight: FlightData) -> Iterator[Solid]:
-    """Yield translucent walls: orange for exclusion, green for inclusion."""
+def _fence(flight: FlightData) -> tuple[np.ndarray, np.ndarray]:
+    """Return rails and posts of the fence: segments (n, 2, 3) [m] and their colours (n, 2, 3), orange for exclusion.
+
+    Lines do not hide the ground behind them, unlike a translucent wall.
+    """
+    top = max(FENCE_HEIGHT, float(flight.truth.position[:, 2].max()) + 2.0)
+    segments, colours = [np.empty((0, 2, 3))], [np.empty((0, 2, 3))]
     for shape in fence_shapes(flight):
-        corners, count = shape.corners, len(shape.corners)
-        vertices = np.concatenate([np.column_stack([corners, np.full(count, z)]) for z in (0.0, FENCE_HEIGHT)])
-        k, n = np.arange(count), (np.arange(count) + 1) % count
-        faces = np.concatenate([np.column_stack([k, n, n + count]), np.column_stack([k, n + count, k + count])])
-        yield Solid(vertices, faces, AXIS_COLOURS[2] if shape.stay_in else BOUND, 0.18, True)
+        ground, corners = (np.column_stack([shape.corners, np.full(len(shape.corners), z)]) for z in (LIFT, top))
+        rails = [ground + share * (corners - ground) for share in (0.0, 0.5, 1.0)]
+        parts = [np.stack([rail, np.roll(rail, -1, axis=0)], axis=1) for rail in rails]
+        every = -(-len(ground) // POSTS)
+        parts.append(np.stack([ground, corners], axis=1)[::every])
+        segments += parts
+        colour = rgb(AXIS_COLOURS[2] if shape.stay_in else BOUND)
+        colours += [np.broadcast_to(colour, part.shape) for part in parts]
+    return np.concatenate(segments), np.concatenate(colours).astype(np.uint8)
 
 
 def _plan(flight: FlightData) -> Iterator[Solid]:
