@@ -25,7 +25,8 @@ SLOWEST = (  # minutes each
 _PEAK = "peak_memory_mb"
 _peaks = pytest.StashKey[dict[str, float]]()
 
-hypothesis.settings.register_profile("lapwing", deadline=None)  # examples compile kernels, on a busy machine
+# Examples compile kernels, on a busy machine. Every run has the same examples.
+hypothesis.settings.register_profile("lapwing", deadline=None, derandomize=True)
 hypothesis.settings.load_profile("lapwing")
 
 
