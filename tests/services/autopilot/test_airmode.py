@@ -51,7 +51,8 @@ def largest(shares, q, mode):
 
     tilt, yaw = s[:, 1] * q.roll + s[:, 2] * q.pitch, s[:, 3] * q.yaw
     _, part = solve([0.0, -1.0], [tilt], [(0.0, 1.0)])
-    *_, turn = solve([0.0, 0.0, -1.0], [tilt, yaw], [(part - 2e-7, part), (0.0, 1.0)])  # tolerance of the solver: 1e-7
+    results = (solve([0.0, 0.0, -1.0], [tilt, yaw], [(part - slack, part), (0.0, 1.0)]) for slack in (1e-9, 1e-6))
+    *_, turn = next(x for x in results if x is not None)  # the solver's tolerance is 1e-7
     return part, turn
 
 
