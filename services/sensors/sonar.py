@@ -3,11 +3,12 @@
 from typing import Annotated, Any, NamedTuple
 
 import numpy as np
-from annotated_types import Ge, Gt, Lt
+from annotated_types import Ge, Gt, Le, Lt
 from numba import types
 
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.lie.quaternion import rotation_matrix
-from lapwing.dynamics.noise import Key
+from lapwing.dynamics.noise import Key, normal
 from lapwing.dynamics.terrain import Level, ray, surface
 from lapwing.dynamics.vector import add, apply, dot, scale
 from lapwing.kernels import always_inline, kernel, math
@@ -17,7 +18,20 @@ from lapwing.services.sensors.delay_line import DEPTH, Fault
 from lapwing.services.sensors.distance import CHANNELS, FARTHEST, DistanceState, blank, initial_state, measure
 from lapwing.services.sensors.sensor_inputs import Truth
 
-__all__ = ["CHANNELS", "PRESETS", "Sonar", "blank", "initial", "sample"]
+__all__ = ["CHANNELS", "PRESETS", "Echo", "Sonar", "blank", "check", "initial", "sample"]
+
+_FADING_LANE = 1  # lane of the random level of an echo, above that of the noise
+_BEL = math.log(10.0)
+
+
+class Echo(NamedTuple):
+    """Level of the echo over that of the noise; over hard ground with slow propellers it is heard up to `range_max`."""
+
+    ground_loss_db: Annotated[float, Ge(0), Le(100)] = 0.0  # [dB] level that soft ground absorbs (grass, snow)
+    propeller_noise_db: Annotated[float, Ge(0), Le(100)] = 0.0  # [dB] rise of the noise level at `rotor_speed`
+    rotor_speed: Annotated[float, Gt(0), Le(1e5)] = 400.0  # [rad/s] mean of the rotors
+    fading_db: Annotated[float, Ge(0), Le(100)] = 0.0  # [dB] standard deviation of the level of an echo
+    absorption_db_per_m: Annotated[float, Ge(0), Le(100)] = 1.3  # [dB/m] of sound in air
 
 
 class Sonar(NamedTuple):
@@ -32,6 +46,7 @@ class Sonar(NamedTuple):
     tilt_max_deg: Annotated[float, Gt(0), Lt(90)] = 89.0  # [deg] maximum tilt with an echo
     rate: Annotated[float, Gt(0)] = 10.0  # [Hz]
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
+    echo: Echo | None = None  # soft ground and noise of the propellers; default: none
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 
@@ -76,6 +91,24 @@ def _over_relief(p: Sonar, truth: Truth) -> float:
     return result
 
 
+def check(p: Sonar) -> None:
+    """Raise ConfigError if the level of an echo is undefined."""
+    if p.echo is not None and p.range_max == math.inf:
+        raise ConfigError("range_max", "got inf", "a finite distance with echo")
+
+
+@kernel
+def _heard_distance(echo: Echo | None, range_max: float, key: Key, tick: int, truth: Truth, distance: float) -> float:
+    """Return the distance, or inf if the echo is weaker than the noise (theory.md, eq. (3.70))."""
+    if echo is None or not 0.0 < distance < math.inf:
+        return distance
+    level = 20.0 / _BEL * math.log(range_max / distance) + 2.0 * echo.absorption_db_per_m * (range_max - distance)
+    level += echo.fading_db * normal(key, tick, _FADING_LANE) - echo.ground_loss_db
+    speed = truth.rotor_speed / echo.rotor_speed
+    noise = (math.exp(0.1 * _BEL * echo.propeller_noise_db) - 1.0) * (speed * speed * speed * speed * speed)
+    return distance if level >= 10.0 / _BEL * math.log(1.0 + noise) else math.inf
+
+
 @kernel
 def initial(p: Sonar, key: Key, truth: Truth) -> DistanceState:
     """Return the state before the first sample."""
@@ -85,7 +118,8 @@ def initial(p: Sonar, key: Key, truth: Truth) -> DistanceState:
 @kernel
 def sample(p: Sonar, s: DistanceState, key: Key, tick: int, truth: Truth) -> tuple[DistanceState, DistanceReading]:
     """Return the next state and the reading. See `imu.sample` for arguments."""
-    s, r = measure(p, s, key, tick, _distance(p, truth))
+    distance = _heard_distance(p.echo, p.range_max, key, tick, truth, _distance(p, truth))
+    s, r = measure(p, s, key, tick, distance)
     return s, DistanceReading(float(np.float32(r.range)), float(np.float32(r.variance)), r.valid)
 
 

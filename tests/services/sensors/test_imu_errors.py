@@ -156,7 +156,7 @@ def test_damage_begins_with_rotor_damage_effect():
 
 
 @pytest.mark.long
-def test_command_flies_scene_with_every_imu_error(tmp_path):
+def test_command_flies_scene_with_sensor_errors(tmp_path):
     tables = (
         'sensors.imu.gyro_filter={bandwidth_hz=98.0,group_delay=2.8e-3}',
         'sensors.imu.accelerometer_filter={bandwidth_hz=94.0,group_delay=3e-3}',
@@ -164,6 +164,7 @@ def test_command_flies_scene_with_every_imu_error(tmp_path):
         'sensors.imu.rotor_vibration={rotor_speed=400.0,imbalance_mg=20.0,damage_mg=300.0}',
         "sensors.imu.sampling_jitter=1e-5", "sensors.imu.saturation_recovery=0.02", "run.duration=1.0",
         "sensors.magnetometer.soft_iron=0.01", "sensors.barometer.temperature_pa_per_k=0.5", "success.require=[]",
+        "sensors.sonar.echo={ground_loss_db=10.0,propeller_noise_db=12.0,fading_db=3.0}",
     )  # fmt: skip
     values = [part for text in tables for part in ("--set", text)]
     command = [sys.executable, "-m", "lapwing", "run", "quad_x", "--mode", "single-process", *values]

@@ -157,6 +157,36 @@ def test_sonar_range_by_height_and_tilt(height, tilt_deg, expected):
     assert reading.valid
 
 
+@pytest.mark.parametrize(
+    ("echo", "rotor_speed", "farthest"),
+    [
+        (sonar.Echo(), 400.0, 7.65),
+        (sonar.Echo(absorption_db_per_m=0.0, ground_loss_db=20.0), 0.0, 0.765),
+        (sonar.Echo(absorption_db_per_m=0.0, propeller_noise_db=20.0), 400.0, 0.765),
+        (sonar.Echo(absorption_db_per_m=0.0, propeller_noise_db=20.0), 200.0, 7.65 / math.sqrt(1.0 + 99.0 / 32.0)),
+        (sonar.Echo(absorption_db_per_m=0.0, propeller_noise_db=20.0), 0.0, 7.65),
+        (sonar.Echo(ground_loss_db=20.0 * math.log10(2.0) + 2.6 * 3.825), 0.0, 3.825),
+    ],
+)
+def test_soft_ground_and_propellers_reduce_range_of_sonar(echo, rotor_speed, farthest):
+    p = SONAR._replace(resolution=0.0, echo=echo)
+    near, far = (
+        read(sonar, p, truth(height=scale * farthest)._replace(rotor_speed=rotor_speed)).range
+        for scale in (1.0 - 1e-6, 1.0 + 1e-6)
+    )
+    assert near == pytest.approx(farthest, rel=2e-6)
+    assert far == math.inf
+
+
+def test_share_of_lost_echoes_with_fading():
+    """The level of an echo at 3.825 m is 6 dB above the threshold: one deviation."""
+    fading = sonar.Echo(absorption_db_per_m=0.0, fading_db=20.0 * math.log10(2.0))
+    p, now = SONAR._replace(echo=fading), truth(height=3.825)
+    s = sonar.initial(p, KEY, now)
+    lost = [sonar.sample(p, s, KEY, tick, now)[1].range == math.inf for tick in range(2000)]
+    assert np.mean(lost) == pytest.approx(0.1587, abs=0.025)
+
+
 @pytest.mark.parametrize(("slope_deg", "tilt_deg"), [(20.0, 0.0), (20.0, 20.0), (20.0, -4.0), (8.0, 0.0), (20.0, -6.0)])
 def test_sonar_reads_nearest_ground_of_slope(slope_deg, tilt_deg):
     """The nearest ground within the beam: across the slope 2 m cos(slope), at slope - tilt from the beam's axis."""

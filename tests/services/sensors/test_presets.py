@@ -12,6 +12,8 @@ from scipy.signal import welch
 from lapwing.services.sensors import registry
 from lapwing.services.sensors.airspeed import PRESETS as AIRSPEEDS
 from lapwing.services.sensors.barometer import PRESETS as BAROMETERS
+from lapwing.services.sensors.imu import PRESETS as IMUS
+from lapwing.services.sensors.magnetometer import PRESETS as MAGNETOMETERS
 from lapwing.services.sensors.optical_flow import PRESETS as FLOWS
 from lapwing.services.sensors.rangefinder import PRESETS as RANGEFINDERS
 from lapwing.services.sensors.sonar import PRESETS as SONARS
@@ -66,6 +68,40 @@ def test_barometer_preset_matches_data_sheet():
     assert 2.0 * p.temperature_pa_per_k <= 0.5
 
 
+def test_second_barometer_preset_matches_data_sheet():
+    p = BAROMETERS["ms5611"]
+    assert deviation(p.noise_pa_per_sqrt_hz, p) == pytest.approx(1.5, rel=0.05)  # 1.2 Pa at the maximum oversampling
+    assert (2.0 * p.turn_on_bias_pa, p.resolution_pa, p.range_pa) == (150.0, 1.0, 1.2e5)
+
+
+def test_inertial_presets_match_data_sheets():
+    mpu6000, bmi088 = IMUS["mpu6000"], IMUS["bmi088"]
+    assert (mpu6000.gyro.range_dps, 1.0 / mpu6000.gyro.resolution_dps) == (500.0, pytest.approx(65.5, rel=1e-3))
+    assert (mpu6000.accelerometer.range_g, 1e3 / mpu6000.accelerometer.resolution_mg) == (8.0, 4096.0)
+    assert (bmi088.gyro.range_dps, 1.0 / bmi088.gyro.resolution_dps) == (500.0, pytest.approx(65.536))
+    assert bmi088.gyro.noise_dps_per_sqrt_hz == pytest.approx(0.014, rel=0.2)  # typical; measured: 0.016
+    assert bmi088.accelerometer.noise_mg_per_sqrt_hz == pytest.approx(0.175)
+    assert (bmi088.accelerometer.range_g, 1e3 / bmi088.accelerometer.resolution_mg) == (
+        12.0,
+        pytest.approx(2730.67, rel=1e-4),
+    )
+    assert 10.0 * bmi088.gyro.temperature_dps_per_k == pytest.approx(0.015)
+    assert 10.0 * bmi088.accelerometer.temperature_mg_per_k == pytest.approx(0.2)
+
+
+def test_magnetometer_presets_match_data_sheets():
+    rm3100, hmc5883l = MAGNETOMETERS["rm3100"], MAGNETOMETERS["hmc5883l"]
+    assert deviation(rm3100.noise_nt_per_sqrt_hz, rm3100) == pytest.approx(15.0)
+    assert (rm3100.range_ut, rm3100.resolution_nt) == (800.0, 13.0)
+    assert deviation(hmc5883l.noise_nt_per_sqrt_hz, hmc5883l) == pytest.approx(200.0)
+    assert (hmc5883l.range_ut, hmc5883l.resolution_nt) == (88.0, 73.0)
+
+
+def test_second_sonar_preset_matches_data_sheet():
+    p = SONARS["mb1202"]
+    assert (p.range_min, p.range_max, p.resolution, p.rate) == (0.2, 7.65, 0.01, 10.0)
+
+
 def test_sonar_preset_matches_data_sheet():
     p = SONARS["hc_sr04"]
     assert 2.0 * deviation(p.noise_m_per_sqrt_hz, p) == pytest.approx(3e-3, rel=0.05)
@@ -78,6 +114,18 @@ def test_rangefinder_preset_matches_data_sheet(distance, accuracy):
     noise = deviation(p.noise_m_per_sqrt_hz, p)
     assert 2.0 * math.hypot(noise, p.scale_error * distance) == pytest.approx(accuracy, rel=0.1)
     assert (p.range_min, p.range_max, p.resolution, p.beam_deg) == (0.3, 12.0, 0.005, 2.3)
+
+
+def test_second_rangefinder_preset_matches_data_sheet():
+    p = RANGEFINDERS["lidar_lite_v3"]
+    assert 2.0 * deviation(p.noise_m_per_sqrt_hz, p) == pytest.approx(0.025)
+    assert 2.0 * p.scale_error == pytest.approx(0.01)
+    assert (p.range_max, p.resolution, p.rate, p.beam_deg) == (
+        40.0,
+        0.01,
+        50.0,
+        pytest.approx(math.degrees(8e-3), rel=1e-3),
+    )
 
 
 def test_airspeed_preset_matches_data_sheet():
