@@ -12,13 +12,14 @@ A user's effect is such a file on Python's path; the scene's table names it with
 import importlib
 from collections.abc import Collection, Iterable, Mapping
 from types import ModuleType
+from typing import Any
 
 from lapwing.dynamics import discovery
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.environment import STANDARD, Environment
 
-__all__ = ["from_scene", "get", "in_evaluation_order", "names", "parameter_class", "validate_table"]
+__all__ = ["from_scene", "get", "in_evaluation_order", "names", "options", "parameter_class", "validate_table"]
 
 # Effects are evaluated in the order of these keys, by default their names. The order affects the rounding of sums, so a
 # renamed effect keeps its key.
@@ -70,6 +71,11 @@ def parameter_class(name: str, module: str | None = None) -> type:
             f"effects.{name}.module", f"{module} has no class {expected}", "a class with the effect's parameters"
         )
     return getattr(defining, expected)
+
+
+def options(name: str, module: str | None = None) -> Mapping[str, Any]:
+    """Return typical values of the keys of an effect that are models of their own. See `get` for arguments."""
+    return getattr(get(name, module), "OPTIONS", {})
 
 
 def in_evaluation_order(active: Iterable[str]) -> list[str]:

@@ -15,10 +15,11 @@ from lapwing.dynamics.environment import Environment
 from lapwing.kernels import math
 from lapwing.kernels.codegen import map_tuple
 
-__all__ = ["KIND", "BatteryThevenin", "Settings"]
+__all__ = ["KIND", "OPTIONS", "BatteryThevenin", "Settings"]
 
 REFERENCE = 298.15  # [K] at which resistances are stated
 NOMINAL_VOLTAGE = 3.7  # [V] of a cell
+OPTIONS = {"peukert_exponent": 1.05}  # value of a lithium-polymer pack, for `lapwing effects`
 HEAT_PER_ENERGY = 1000.0 / (150.0 * 3600.0)  # [1/K] 1000 J/(kg K) over 150 W h/kg
 
 Resistance = Annotated[float, Ge(0), Le(1)]

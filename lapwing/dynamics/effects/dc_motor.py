@@ -20,6 +20,7 @@ from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple, reduce_tuple
 
 KIND = "motor model"
+OPTIONS = {"braking_current": 10.0, "inductance": 1e-5}  # typical values of a small motor, for `lapwing effects`
 
 
 class Settings(NamedTuple):

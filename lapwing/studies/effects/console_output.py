@@ -44,7 +44,7 @@ def _table(console: Console, title: str, study: Study, active: bool) -> None:
             continue
         ratio = f"{row.airborne / study.airborne:.0%}" if row.airborne > study.noise[0] else ""
         airborne, standing = _cost(row.airborne, study.noise[0]), _cost(row.standing, study.noise[1])
-        rows.add_row(row.name, airborne, ratio, standing, *_changes(row.influence))
+        rows.add_row(row.name.replace(".", "\n  ."), airborne, ratio, standing, *_changes(row.influence))
     console.print(rows)
     for row in _sorted_rows(study, active):
         if row.remark:

@@ -1,4 +1,4 @@
-"""Procedure of `lapwing effects`: each effect removed or added once, then the smallest sufficient set."""
+"""Procedure of `lapwing effects`: each effect and option removed or added once, then the smallest sufficient set."""
 
 import math
 from collections.abc import Callable, Collection
@@ -41,9 +41,9 @@ def _extend(position: np.ndarray, count: int) -> np.ndarray:
 
 
 class Row(NamedTuple):
-    """Result of one effect, which the scene has or not."""
+    """Result of one effect, or of one option of an effect, which the scene has or not."""
 
-    name: str
+    name: str  # `EFFECT` or `EFFECT.KEY`
     active: bool  # True if the scene has the effect
     influence: Influence | None  # of its removal or addition; None if that is impossible
     airborne: float  # [ns] share of a plant step while hovering
@@ -76,6 +76,8 @@ def study(
 ) -> Study:
     """Fly the scene without each of its effects, with each of the others, and with reduced sets.
 
+    Options of its effects that their modules list in `OPTIONS` are removed or added likewise.
+
     Args:
         scene: scene of a multirotor.
         within: [m] largest distance of the flight with the smallest set from that of the scene.
@@ -93,6 +95,8 @@ def study(
     multi_vehicle_effects = [name for name, kind in classes.items() if kind in INTERACTION]
     variants_without = {name: _without(tables, name) for name in tables if name in names}
     variants_with = {name: {**tables, name: {}} for name in classes if name not in multi_vehicle_effects}
+    variants_without |= _options(tables, names, active=True)
+    variants_with |= _options(tables, names, active=False)
     errors = {name: why for name, v in (variants_without | variants_with).items() if (why := check_effects(scene, v))}
     valid_variants = {name: v for name, v in (variants_without | variants_with).items() if name not in errors}
     result: dict[str, Influence] = {}
@@ -104,9 +108,9 @@ def study(
         if reference.failure:
             raise ValueError(f"{scene.path}: {reference.failure}")
         for i, (name, flight) in enumerate(zip(valid_variants, flights, strict=True), 1):
-            report(f"{'without' if name in tables else 'with'} {name}", i + 1, count)
+            report(f"{'without' if name in variants_without else 'with'} {name}", i + 1, count)
             result[name] = influence(reference, flight)
-        removable = sorted((n for n in variants_without if n in result), key=lambda n: result[n].trajectory)
+        removable = sorted((n for n in tables if n in result), key=lambda n: result[n].trajectory)
         removable = [n for n in removable if result[n].trajectory <= within]
         smallest, distance = _smallest(
             pool, tables, reference, removable, within, lambda text: report(text, count, count + 1)
@@ -126,6 +130,18 @@ def study(
     ]
     noise = max(cost.airborne_noise for cost in all_costs), max(cost.standing_noise for cost in all_costs)
     return Study(scene.name, within, *full_cost[:2], tuple(rows), tuple(smallest), distance, *smallest_cost[:2], noise)
+
+
+def _options(tables: Tables, names: Collection[str], active: bool) -> dict[str, dict[str, Any]]:
+    """Return the tables without each option that the scene has (`active`), or with each that it does not have."""
+    result = {}
+    for name in sorted(set(tables) & set(names)):
+        table = dict(tables[name])
+        for key, value in effects.options(name, table.get("module")).items():
+            if (key in table) == active:
+                other = {k: v for k, v in table.items() if k != key} if active else {**table, key: value}
+                result[f"{name}.{key}"] = {**tables, name: other}
+    return result
 
 
 def _without(tables: Tables, *names: str) -> dict[str, Any]:

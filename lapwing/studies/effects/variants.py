@@ -4,7 +4,6 @@ import os
 from collections.abc import Iterable, Iterator, Mapping
 from concurrent.futures import ProcessPoolExecutor
 from contextlib import contextmanager
-from functools import partial
 from typing import Any
 
 from lapwing.cosim.scene import Scene
@@ -33,6 +32,11 @@ def check_effects(scene: Scene, tables: Tables) -> str:
     return ""
 
 
+def fly_for_truth(scene: Scene) -> FlightData:
+    """Fly the scene to its end. Return a flight with the ground truth alone."""
+    return fly(scene, (TRUTH,))  # the topic itself: a copy of it in a worker would be another one
+
+
 class VariantPool:
     """Pool of processes that fly variants of one scene; each set of effects is compiled once and cached on disk."""
 
@@ -41,7 +45,7 @@ class VariantPool:
 
     def fly(self, variants: Iterable[Tables]) -> Iterator[FlightData]:
         """Yield the flight of each variant in order, with the ground truth alone."""
-        return self._pool.map(partial(fly, only=(TRUTH,)), [variant(self._scene, tables) for tables in variants])
+        return self._pool.map(fly_for_truth, [variant(self._scene, tables) for tables in variants])
 
 
 @contextmanager

@@ -3,6 +3,8 @@
 import contextlib
 import json
 import math
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -116,6 +118,29 @@ def test_every_effect_of_catalogue_is_listed():
     assert rows["ceiling_effect"].remark.startswith("effects.ceiling_effect.height: missing")
     assert rows["collision"].remark == "effects.collision: requires other vehicles"
     assert rows["downwash"].remark == "effects.downwash: requires other vehicles"
+
+
+@pytest.mark.usefixtures("synthetic_flights")
+@pytest.mark.parametrize(("table", "active"), [("{}", False), ("{inductance=1e-5, braking_current=5.0}", True)])
+def test_options_of_effects_are_studied(table, active):
+    scene = load(HOVER, [f"effects.dc_motor={table}", "effects.battery_thevenin={peukert_exponent=1.1}"])
+    result = run_study(scene, 0.01, lambda *_: None, ["dc_motor", "battery_thevenin"])
+    rows = {row.name: row.active for row in result.rows if not row.remark}
+    assert rows["dc_motor.inductance"] == rows["dc_motor.braking_current"] == active
+    assert rows["battery_thevenin.peukert_exponent"]
+    assert set(result.smallest) <= set(scene[Effects].tables)
+
+
+@pytest.mark.long
+def test_command_shows_influence_of_motor_options(tmp_path):
+    path = tmp_path / "effects.json"
+    scene = ["hover", "--set", "effects.dc_motor={}", "--set", "run.duration=1.0", "--only", "dc_motor"]
+    command = [sys.executable, "-m", "lapwing", "effects", *scene, "--json", str(path)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=900, check=False)
+    assert done.returncode == 0, done.stderr
+    rows = {row["name"]: row for row in json.loads(path.read_text())["rows"]}
+    assert 0.0 < rows["dc_motor.inductance"]["influence"]["trajectory"] < 0.01
+    assert "…" not in done.stdout  # no number is cut
 
 
 def study():
