@@ -20,6 +20,7 @@ ALIGNED = 0.25  # maximum squared fraction of the disturbance that is not along 
 DETECTION_TIME = 0.1  # [s]
 CLEAR = 0.3  # [m] height below which the feet may push
 IMPACT = 1.0  # [g] upward specific force, beyond that of the rotors, that only a contact causes
+PUSH = 0.3  # [g] the same of a vehicle that sits on ground higher than at the start; 0.00 in flight
 PAUSE = 0.5  # [s] after an impact, during which the feet may push or bounce
 LEAST = 0.3  # minimum expected thrust, as a fraction of the hover thrust
 
@@ -133,9 +134,9 @@ def step(p: Parameters, s: State, dt: float, e: StateEstimate, height: float, co
         ay += p.pitch_arm[k] * thrust / iy
     before = s.failed if p.enabled and s.failed != p.repaired else 0
     # the ground may be higher than at the start
-    is_impact = excess(p, root, e.attitude, e.acceleration_world) > IMPACT
-    pause = PAUSE if is_impact else max(s.pause - dt, 0.0)
-    if height < CLEAR or pause > 0.0:
+    unexplained = excess(p, root, e.attitude, e.acceleration_world)
+    pause = PAUSE if unexplained > IMPACT else max(s.pause - dt, 0.0)
+    if height < CLEAR or pause > 0.0 or unexplained > PUSH:
         return State(commanded, root, (wx, wy), (0.0, 0.0), 0, 0.0, before, pause)
     ex, ey = wx - s.rate[0], wy - s.rate[1]
     gain = 2.0 * BANDWIDTH

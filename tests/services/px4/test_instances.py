@@ -5,6 +5,7 @@ import os
 import socket
 import subprocess
 import sys
+import time
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -85,6 +86,20 @@ def test_campaign_starts_and_ends_one_program_for_each_run(program, tmp_path):
     assert json.loads((tmp_path / "c.json").read_text())["runs"] == 3
 
 
+def _bind(s, port):
+    """Listen at the port; wait for another run that uses it."""
+    deadline = time.monotonic() + 300.0
+    while True:
+        try:
+            s.bind((HOST, port))
+            s.listen()
+            return
+        except OSError:
+            if time.monotonic() > deadline:
+                raise
+            time.sleep(0.1)
+
+
 @pytest.mark.long
 def test_concurrent_run_uses_next_instance(program, tmp_path):
     command, file = program
@@ -92,11 +107,7 @@ def test_concurrent_run_uses_next_instance(program, tmp_path):
         for instance in range(2):  # occupied as by two other runs
             s = stack.enter_context(socket.socket())
             s.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-            try:
-                s.bind((HOST, PORT + instance))
-                s.listen()
-            except OSError:
-                continue  # in use by another run
+            _bind(s, PORT + instance)
         done = lapwing("run", "px4_quad", "--mode", "single-process", "--log", str(tmp_path / "a.mcap"),
                        "--set", command)  # fmt: skip
     assert done.returncode == 0, done.stdout + done.stderr
