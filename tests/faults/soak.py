@@ -18,7 +18,7 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from statistics import median
@@ -42,7 +42,7 @@ class Use(NamedTuple):
     station: int = 0  # [B] resident memory of the ground station
 
     @classmethod
-    def of(cls, processes: Iterator[int]) -> "Use":
+    def of(cls, processes: Iterable[int]) -> "Use":
         """Return the present sums over processes."""
         memory = files = threads = 0
         for process in processes:
@@ -100,11 +100,11 @@ def fly(scene: list[str], endpoint: str, count: list[int]) -> Flight:
             while flight.poll() is None:
                 processes = leak_checks.of_trial(folder)
                 taken |= leak_checks.ports(processes)
-                use = Use(*map(max, use, Use.of(iter(processes))))
+                use = Use(*map(max, use, Use.of(processes)))
                 time.sleep(1.0)
             text.seek(0)
             report = text.read()
-        use = use._replace(station=Use.of(iter([os.getpid()])).memory)
+        use = use._replace(station=Use.of([os.getpid()]).memory)
         wrong = leak_checks.left(folder, taken, None, 10.0)
         if flight.returncode:
             return Flight(use, 0, 0, [*wrong, f"exit code {flight.returncode}: {report[-300:]}"])

@@ -6,17 +6,12 @@ from tests.faults.soak import Use, grown, soak
 
 
 @pytest.mark.long
-def test_flights_with_ground_station_leave_nothing_behind():
-    first, second = soak_two()
+def test_flights_with_ground_station_leave_no_process_port_or_lock():
+    flights = soak(["hover", "--set", "run.duration=3"], 600.0)
+    first, second = next(flights), next(flights)
     assert first.wrong == second.wrong == []
     assert first.messages > 50
     assert first.use.threads > 10
-
-
-def soak_two():
-    """Return two short flights."""
-    flights = soak(["hover", "--set", "run.duration=3"], 600.0)
-    return next(flights), next(flights)
 
 
 def test_growth_is_found():
