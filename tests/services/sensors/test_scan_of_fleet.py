@@ -25,7 +25,7 @@ seed = 3
 [effects.ground_contact]
 [effects.body_drag]
 [effects.wind_constant]
-velocity = [2.0, 1.0, 0.0]
+velocity = [5.0, 3.0, 0.0]
 [autopilot]
 gains = "tuned"
 estimator = "ground_truth"
@@ -39,16 +39,17 @@ initial_position = [0.0, 3.0]
 [vehicle.sensors.lidar]
 preset = "ideal"
 columns = 720
-position = [0.1, 0.0, -0.1]
+position = [0.1, 0.0, -0.2]  # the small vehicle is below the origin
 range_max = 30.0
 [vehicle.sensors.rangefinder]
 preset = "ideal"
 azimuth_deg = -90.0
+position = [0.0, 0.0, -0.2]
 elevation_deg = 0.0
 range_max = 30.0
 [vehicle.sensors.depth_camera]
 preset = "ideal"
-width = 20
+width = 21
 height = 15
 [[vehicle]]
 name = "seen"
@@ -124,7 +125,7 @@ def test_lidar_returns_lie_on_bodies_of_others(flown, scene_file):
     scenes = {vehicle.lookup("vehicle.name"): vehicle for vehicle in load(scene_file).vehicles}
     for k in range(len(scan)):
         returned = scan.ranges[k] < 3.5  # not the ground
-        points = own[k] + attitude[k].apply(rays * np.where(returned, scan.ranges[k], 0.0)[:, None] + (0.1, 0.0, -0.1))
+        points = own[k] + attitude[k].apply(rays * np.where(returned, scan.ranges[k], 0.0)[:, None] + (0.1, 0.0, -0.2))
         on_any = np.zeros(720, bool)
         for name in met:
             body, (position, turned) = visible_body(airframe(scenes[name])), poses(log, name, scan.times)
@@ -151,8 +152,8 @@ def test_distance_is_that_between_vehicles(flown, scene_file):
     angle = np.arange(720) * math.tau / 720 - math.pi
     sectors = sector_distances(angle, scan.ranges[0], 30.0)
     assert (sectors[0], sectors[18]) == (round(100.0 * to_front), round(100.0 * scan.ranges[0, 170:191].min()))
-    depth = np.ascontiguousarray(flight.topic("depth/image_rect").data[0].astype(np.uint8)).view("<f4").reshape(15, 20)
-    assert depth[7, 9:11] == pytest.approx(4.0 - ahead.radius, abs=2e-3)
+    depth = np.ascontiguousarray(flight.topic("depth/image_rect").data[0].astype(np.uint8)).view("<f4").reshape(15, 21)
+    assert depth[7, 10] == pytest.approx(4.0 - ahead.radius, abs=1e-6)
 
 
 @pytest.mark.long
