@@ -4,6 +4,7 @@ import json
 import math
 import subprocess
 import sys
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,8 +12,9 @@ from scipy.spatial.transform import Rotation
 
 from lapwing.cosim.config.serialise import first_difference, from_json, to_json
 from lapwing.dynamics.vehicles.visible_body import visible_body
+from lapwing.messages.topics import LASER_SCAN
 from lapwing.services.common.vehicle_schema import airframe
-from lapwing.services.mavlink.telemetry.obstacle_distance import sector_distances
+from lapwing.services.mavlink.telemetry.obstacle_distance import obstacle_distance
 from lapwing.services.scene_resolver import load, parse, reseed, resolve
 from lapwing.studies.flight_data import FlightData
 
@@ -149,9 +151,10 @@ def test_distance_is_that_between_vehicles(flown, scene_file):
     to_right, to_front = 2.5 - seen.radius, 4.0 - 0.1 - ahead.radius
     assert flight.topic("rangefinder").range[0] == pytest.approx(to_right, abs=1e-6)
     assert scan.ranges[0, 360] == pytest.approx(to_front, abs=1e-6)
-    angle = np.arange(720) * math.tau / 720 - math.pi
-    sectors = sector_distances(angle, scan.ranges[0], 30.0)
-    assert (sectors[0], sectors[18]) == (round(100.0 * to_front), round(100.0 * scan.ranges[0, 170:191].min()))
+    fields = {name: scan[name][0] for name in ("ranges", "angle_min", "angle_increment", "range_min", "range_max")}
+    newest = {LASER_SCAN: SimpleNamespace(**fields)}
+    sectors = obstacle_distance(SimpleNamespace(get=newest.get, boot_us=0)).distances
+    assert (sectors[0], sectors[18], sectors[36]) == (round(100.0 * to_front), round(100.0 * to_right), 3001)
     depth = np.ascontiguousarray(flight.topic("depth/image_rect").data[0].astype(np.uint8)).view("<f4").reshape(15, 21)
     assert depth[7, 10] == pytest.approx(4.0 - ahead.radius, abs=1e-6)
 
