@@ -8,13 +8,15 @@ from benchmarks._targets import Row
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.dynamics.environment import STANDARD
 from lapwing.dynamics.terrain import LEVEL, relief
+from lapwing.dynamics.vehicles.visible_body import VisibleBody
 from lapwing.messages.cdr_arrays import Record
 from lapwing.services.sensors import lidar
 from lapwing.services.sensors.block import Instrument
-from lapwing.services.sensors.scan import ScanPose
+from lapwing.services.sensors.scan import ScanPose, VehiclePose
 
 SCANS = 20
 REPEATS = 5
+OTHERS = 9  # vehicles around the lidar
 TARGET = 0.20  # share of one core
 
 
@@ -32,13 +34,17 @@ def terrains():
     }
 
 
-def share(terrain):
-    """Return the least share of a core over the repeats."""
-    instrument = Instrument(lidar.VLP16, (1, 2), 9.81, STANDARD._replace(terrain=terrain))
+def share(terrain, vehicles=0):
+    """Return the least share of a core over the repeats, with this number of other vehicles 5 m away."""
+    bodies = (VisibleBody(0.0, 0.0, 0.5, -0.2, 0.1),) * vehicles
+    instrument = Instrument(lidar.VLP16, (1, 2), 9.81, STANDARD._replace(terrain=terrain), bodies)
     (encoder,) = lidar.wires("drone1", Port("lidar", lidar.READING, 25), instrument)
     record, ticks = Record.of(encoder.sample()), np.arange(SCANS)
     position = np.column_stack([0.1 * ticks, 0.0 * ticks, 2.0 + 0.0 * ticks])
-    pose = ScanPose(position, np.tile([1.0, 0.0, 0.0, 0.0], (SCANS, 1)), ticks)
+    upright = np.tile([1.0, 0.0, 0.0, 0.0], (SCANS, 1))
+    angles = [2.0 * np.pi * k / max(vehicles, 1) for k in range(vehicles)]
+    others = tuple(VehiclePose(position + 5.0 * np.array([np.cos(a), np.sin(a), 0.0]), upright) for a in angles)
+    pose = ScanPose(position, upright, ticks, others)
     record.encode(SCANS, encoder.fields(pose, ticks * 100_000_000))
     spent = []
     for _ in range(REPEATS):
@@ -50,9 +56,11 @@ def share(terrain):
 
 def main():
     """Print and return the shares."""
+    cases = [(name, terrain, 0) for name, terrain in terrains().items()]
+    cases.append((f"level ground, {OTHERS} vehicles", LEVEL, OTHERS))
     rows = []
-    for name, terrain in terrains().items():
-        value = share(terrain)
+    for name, terrain, vehicles in cases:
+        value = share(terrain, vehicles)
         print(f"{name}: {100.0 * value:.1f} % of a core")
         rows.append(Row(f"lidar 16 x 360 at 10 Hz, {name}", value, "core", TARGET))
     return rows

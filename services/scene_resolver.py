@@ -3,7 +3,7 @@
 import importlib
 import importlib.util
 import pkgutil
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import cache
 from operator import index
 from pathlib import Path
@@ -139,23 +139,25 @@ def resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]] = MappingProxyTyp
             with vehicle.located():
                 members.append(_resolve(vehicle, plans))
         with scene.located():
-            return multi_vehicle.merge_configs(_with_fleet_coupling(members, "vehicle.{}."), dict(scene.resolved))
+            members = _with_fleet_coupling(members, scene.vehicles, "vehicle.{}.")
+            return multi_vehicle.merge_configs(members, dict(scene.resolved))
     with scene.located():
-        (setup,) = _with_fleet_coupling([_resolve(scene, plans)], "")
+        (setup,) = _with_fleet_coupling([_resolve(scene, plans)], [scene], "")
         return setup
 
 
-def _with_fleet_coupling(members: list[RunConfig], key: str) -> list[RunConfig]:
+def _with_fleet_coupling(members: list[RunConfig], vehicles: Sequence[Scene], key: str) -> list[RunConfig]:
     """Return the configurations of all vehicles, combined by the services whose `resolve.py` has `fleet`.
 
-    `key` is the prefix of a vehicle's keys, with {} for its number.
+    `vehicles` are the scenes of the members; `key` is the prefix of a vehicle's keys, with {} for its number.
     """
+    scenes = {member.vehicle: scene for member, scene in zip(members, vehicles, strict=True)}
     keys = {member.vehicle: key.format(i) for i, member in enumerate(members)}
     for name in dict.fromkeys(name for member in members for name in member.services):
         module = _resolvers()[entry(name).name]
         if hasattr(module, "fleet"):
             shares = {member.vehicle: member.services[name] for member in members if name in member.services}
-            result = module.fleet(shares, keys)
+            result = module.fleet(shares, keys, scenes)
             members = [
                 member._replace(services={**member.services, name: result[member.vehicle]})
                 if member.vehicle in result

@@ -51,8 +51,19 @@ def _with_contact(scene: Scene, config: ServiceConfig) -> ServiceConfig:
     return ServiceConfig(plant._replace(contact=ContactView(plant.core.vehicle)), config.inputs, (*config.ports, port))
 
 
-def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[str, ServiceConfig]:
-    """Return the plants by vehicle name, coupled to each other. See `fleet_coupling.couple`."""
+def fleet(
+    shares: Mapping[str, ServiceConfig], keys: Mapping[str, str], scenes: Mapping[str, Scene]
+) -> dict[str, ServiceConfig]:
+    """Return the plants by vehicle name, coupled to each other.
+
+    Args:
+        shares: configuration of each vehicle with this service, by vehicle name.
+        keys: prefix of each vehicle's scene keys.
+        scenes: scene of each vehicle of the fleet, with and without this service.
+
+    Raises:
+        ConfigError: see `fleet_coupling.couple`.
+    """
     return fleet_coupling.couple(shares, keys)
 
 

@@ -10,9 +10,10 @@ from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.noise import Key
 from lapwing.dynamics.terrain import surface
 from lapwing.dynamics.vector import subtract
+from lapwing.dynamics.vehicles.visible_body import VisibleBody
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import compile_source, generic
-from lapwing.services.sensors.sensor_inputs import ROTORS, Truth
+from lapwing.services.sensors.sensor_inputs import ROTORS, OtherVehicle, Truth
 
 
 class Instrument(NamedTuple):
@@ -22,6 +23,7 @@ class Instrument(NamedTuple):
     key: Key  # key of its random numbers
     gravity: float  # [m/s^2] at home, 0 without a gravity effect
     around: Environment
+    others: tuple[VisibleBody, ...] = ()  # vehicles that it sees, in the order of its further inputs
 
 
 @generic(inline=True)
@@ -41,6 +43,16 @@ def first_rotors(speed: types.Type) -> Any:
     """Return the speeds of ROTORS rotors, 0 beyond the vehicle's number."""
     items = ", ".join(f"speed[{i}]" if i < len(speed) else "0.0" for i in range(ROTORS))
     return compile_source("first_rotors(speed)", {}, f"return ({items})")
+
+
+@generic(inline=True)
+def _other_vehicles(bodies: types.Type, inputs: types.Type) -> Any:
+    """Return the `OtherVehicle`s, whose true states follow the vehicle's own in the inputs."""
+    items = "".join(
+        f"OtherVehicle(inputs[{i + 1}].value.position_world, inputs[{i + 1}].value.attitude, bodies[{i}]), "
+        for i in range(len(bodies))
+    )
+    return compile_source("other_vehicles(bodies, inputs)", {"OtherVehicle": OtherVehicle}, f"return ({items})")
 
 
 @always_inline
@@ -75,6 +87,7 @@ def step(p: Instrument, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> t
         thrust,
         speed / len(x.rotor_speed),
         first_rotors(x.rotor_speed),
+        _other_vehicles(p.others, inputs),
     )
     if tick == 0:
         s = _initial(p.sensor, p.key, truth)

@@ -19,6 +19,8 @@ from lapwing.services.sensors.sensor_inputs import Place, Truth
 
 __all__ = ["PRESETS", "READING", "DepthCamera", "blank", "initial", "pixels", "sample", "wires"]
 
+SEES_VEHICLES = True
+
 
 class DepthCamera(NamedTuple):
     """Parameters of a pinhole camera."""

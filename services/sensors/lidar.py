@@ -21,6 +21,7 @@ from lapwing.services.sensors.sensor_inputs import Place, Truth
 __all__ = ["PRESETS", "READING", "Lidar", "blank", "check", "initial", "rays", "sample", "wires"]
 
 MOST_RAYS = 200_000  # of one scan
+SEES_VEHICLES = True
 
 
 class Lidar(NamedTuple):

@@ -12,17 +12,20 @@ from lapwing.dynamics.lie.quaternion import rotate
 from lapwing.dynamics.noise import Key
 from lapwing.dynamics.terrain import Level, ray
 from lapwing.dynamics.vector import ZERO, Vec3, add
+from lapwing.dynamics.vehicles.visible_body import distance_to_body
 from lapwing.kernels import always_inline, kernel, math
-from lapwing.kernels.codegen import generic
+from lapwing.kernels.codegen import generic, reduce_tuple
 from lapwing.messages import Range, header
 from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import stamp_columns
 from lapwing.services.common.ports import DistanceReading
 from lapwing.services.sensors.delay_line import DEPTH, Fault
 from lapwing.services.sensors.distance import CHANNELS, FARTHEST, DistanceState, blank, initial_state, measure
-from lapwing.services.sensors.sensor_inputs import Place, Truth
+from lapwing.services.sensors.sensor_inputs import OtherVehicle, Place, Truth
 
 __all__ = ["CHANNELS", "PRESETS", "READING", "Rangefinder", "blank", "initial", "sample", "to_ground", "wires"]
+
+SEES_VEHICLES = True
 
 
 class Rangefinder(NamedTuple):
@@ -64,12 +67,20 @@ def to_ground(terrain: types.Type, origin: types.Type, direction: types.Type) ->
 
 
 @always_inline
+def _nearest(ray_world: tuple[Vec3, Vec3], distance: float, other: OtherVehicle, same: OtherVehicle) -> float:
+    origin, direction = ray_world
+    return min(distance, distance_to_body(other.body, other.position_world, other.attitude, origin, direction))
+
+
+@always_inline
 def _distance(p: Rangefinder, truth: Truth) -> float:
     azimuth, elevation = math.radians(p.azimuth_deg), math.radians(p.elevation_deg)
     across = math.cos(elevation)
     direction = (across * math.cos(azimuth), across * math.sin(azimuth), math.sin(elevation))
     origin = add(truth.position_world, rotate(truth.attitude, p.position))
-    return to_ground(truth.terrain, origin, rotate(truth.attitude, direction))
+    ray_world = rotate(truth.attitude, direction)
+    ground = to_ground(truth.terrain, origin, ray_world)
+    return reduce_tuple(_nearest, (origin, ray_world), ground, truth.others, truth.others)
 
 
 @kernel

@@ -1,28 +1,32 @@
 """Resolution of a scene's `[sensors]` into the service's configuration."""
 
 import math
+import sys
 from collections.abc import Mapping
 from typing import Any
 
 import numba
 
 from lapwing.cosim.config.run_config import ServiceConfig
+from lapwing.cosim.diagram.multi_vehicle import neighbour_port
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.noise import stream_key
 from lapwing.dynamics.terrain.ray_casting import as_relief, steepness
+from lapwing.dynamics.vehicles.visible_body import VisibleBody, visible_body
 from lapwing.services.common import ports
 from lapwing.services.common.communication_schema import Communication, ticks
 from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.run_schema import Run
-from lapwing.services.common.vehicle_schema import Vehicle, gravity
+from lapwing.services.common.vehicle_schema import Vehicle, VehicleAirframe, airframe, gravity
 from lapwing.services.sensors.block import Instrument
 from lapwing.services.sensors.encoders import GpsWiring, SonarWiring
 from lapwing.services.sensors.gps import Gps
 from lapwing.services.sensors.imu import Imu
 from lapwing.services.sensors.registry import module_of, parameters
 from lapwing.services.sensors.rotor_vibration import Damage
+from lapwing.services.sensors.scan import ScanPose, VehiclePose
 from lapwing.services.sensors.schema import Sensors
 from lapwing.services.sensors.sensor_inputs import Truth
 from lapwing.services.sensors.service import SensorsSetup
@@ -81,6 +85,35 @@ def _with_terrain(scene: Scene, p: Gps) -> Gps:
         return p
     steep = steepness(as_relief(environment(scene).terrain))
     return p._replace(constellation=p.constellation._replace(steepness=steep))
+
+
+def fleet(
+    shares: Mapping[str, ServiceConfig], keys: Mapping[str, str], scenes: Mapping[str, Scene]
+) -> dict[str, ServiceConfig]:
+    """Return the sensors by vehicle name; those that see vehicles have the others' true states as inputs.
+
+    A vehicle without an airframe has no dimensions and is not seen. See `plant.resolve.fleet` for arguments.
+    """
+    bodies = {name: visible_body(airframe(scene)) for name, scene in scenes.items() if scene.has(VehicleAirframe)}
+    return {
+        name: _with_others(share, {other: body for other, body in bodies.items() if other != name})
+        for name, share in shares.items()
+    }
+
+
+def _with_others(config: ServiceConfig, bodies: Mapping[str, VisibleBody]) -> ServiceConfig:
+    setup: SensorsSetup = config.parameters
+    seeing = [hasattr(sys.modules[type(i.sensor).__module__], "SEES_VEHICLES") for i in setup.instruments]
+    if not bodies or not any(seeing):
+        return config
+    instruments, outputs = [], []
+    for sees, instrument, port in zip(seeing, setup.instruments, config.ports, strict=True):
+        instruments.append(instrument._replace(others=tuple(bodies.values())) if sees else instrument)
+        if isinstance(port.like, ScanPose):
+            port = port._replace(like=port.like._replace(others=(VehiclePose(),) * len(bodies)))
+        outputs.append(port)
+    inputs = (*config.inputs, *(InputPort(neighbour_port(other, ports.TRUTH)) for other in bodies))
+    return ServiceConfig(setup._replace(instruments=tuple(instruments)), inputs, tuple(outputs))
 
 
 def reseed(config: ServiceConfig, seed: int, vehicle: str) -> ServiceConfig:

@@ -9,10 +9,19 @@ from lapwing.dynamics.environment import STANDARD
 from lapwing.dynamics.geodesy import Home
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
 from lapwing.dynamics.vector import ZERO, Vec3
+from lapwing.dynamics.vehicles.visible_body import VisibleBody
 
 Arm = Annotated[float, Ge(-10.0), Le(10.0)]
 ROTORS = 8  # rotors whose speeds are inputs of the sensors
 Place = tuple[Arm, Arm, Arm]  # [m] position of an instrument, body
+
+
+class OtherVehicle(NamedTuple):
+    """Another vehicle of the fleet, as a sensor sees it."""
+
+    position_world: Vec3  # [m] of its origin
+    attitude: Quaternion  # wxyz, body to world
+    body: VisibleBody
 
 
 class Truth(NamedTuple):
@@ -36,3 +45,4 @@ class Truth(NamedTuple):
     thrust: float = 0.0  # [N] of all rotors
     rotor_speed: float = 0.0  # [rad/s] mean of the rotors
     rotor_speeds: tuple[float, ...] = (0.0,) * ROTORS  # [rad/s] of the first rotors
+    others: tuple[OtherVehicle, ...] = ()  # of a fleet, for sensors with SEES_VEHICLES

@@ -28,7 +28,7 @@ def create(setup: RunConfig) -> Service:
     config = setup.services[NAME]
     s: SensorsSetup = config.parameters
     parts = [
-        Block(f"{NAME}.{port.name}", p, Cell(_blank(p)), config.inputs, (port,), port.period)
+        Block(f"{NAME}.{port.name}", p, Cell(_blank(p)), config.inputs[: 1 + len(p.others)], (port,), port.period)
         for p, port in zip(s.instruments, config.ports, strict=True)
     ]
     return Service(NAME, parts, _module_encoders(setup, s) + wires(setup, s.sonar, s.gps))

@@ -44,12 +44,12 @@ def _leader(trajectory: Trajectory) -> tuple[str, bool]:
     return (trajectory.leader, trajectory.frame != "world") if trajectory.leader else ("", False)
 
 
-def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[str, ServiceConfig]:
+def fleet(
+    shares: Mapping[str, ServiceConfig], keys: Mapping[str, str], scenes: Mapping[str, Scene]
+) -> dict[str, ServiceConfig]:
     """Return the trajectories by vehicle name, with followers combined with their leaders' paths.
 
-    Args:
-        shares: configuration by vehicle name.
-        keys: prefix of each vehicle's scene keys.
+    See `plant.resolve.fleet` for arguments.
 
     Raises:
         ConfigError: a leader does not exist or follows another vehicle.

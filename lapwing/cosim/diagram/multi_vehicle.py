@@ -43,7 +43,7 @@ def merge_configs(members: Sequence[RunConfig], resolved: Mapping[str, Any]) -> 
         configs = {member.vehicle: member.services[name] for member in members if name in member.services}
         services[name] = ServiceConfig(
             PerVehicle(tuple(configs), tuple(configs.values())),
-            tuple(_input(vehicle, i) for vehicle, config in configs.items() for i in config.inputs),
+            tuple(dict.fromkeys(_input(vehicle, i) for vehicle, config in configs.items() for i in config.inputs)),
             tuple(_port(vehicle, port) for vehicle, config in configs.items() for port in config.ports),
         )
     auxiliary = {}

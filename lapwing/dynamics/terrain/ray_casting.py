@@ -56,7 +56,7 @@ def _to_field(t, o, d, steep, longest):
 
 
 @kernel
-def _between(position, direction, low, high, first, last):
+def between(position, direction, low, high, first, last):
     """Return the part of [first, last] in which a coordinate is between `low` and `high`."""
     if direction == 0.0:
         return (first, last) if low <= position <= high else (math.inf, -math.inf)
@@ -77,26 +77,31 @@ def _below(height, o, d, first, last):
 def _to_box(box, o, d):
     x, y, c, s = o[0] - box[0], o[1] - box[1], box[2], box[3]
     first, last = _below(box[7], o, d, 0.0, math.inf)
-    first, last = _between(c * x + s * y, c * d[0] + s * d[1], box[4], box[5], first, last)
-    first, last = _between(c * y - s * x, c * d[1] - s * d[0], -box[6], box[6], first, last)
+    first, last = between(c * x + s * y, c * d[0] + s * d[1], box[4], box[5], first, last)
+    first, last = between(c * y - s * x, c * d[1] - s * d[0], -box[6], box[6], first, last)
     return first if first <= last else math.inf
 
 
 @kernel
-def _to_cylinder(cylinder, o, d):
-    x, y = o[0] - cylinder[0], o[1] - cylinder[1]
+def within_circle(x, y, d, radius):
+    """Return the part (first, last) of the ray ahead of its origin that is within a circle about z, seen from above.
+
+    `x` and `y` are those of the origin from the centre; first > last without such a part.
+    """
     a, b = d[0] * d[0] + d[1] * d[1], x * d[0] + y * d[1]
-    outside = x * x + y * y - cylinder[2] * cylinder[2]
-    first, last = 0.0, math.inf
+    outside = x * x + y * y - radius * radius
     if a == 0.0:
-        if outside > 0.0:
-            return math.inf
-    else:
-        square = b * b - a * outside
-        if square < 0.0:
-            return math.inf
-        root = math.sqrt(square)
-        first, last = max((-b - root) / a, 0.0), (root - b) / a
+        return (math.inf, -math.inf) if outside > 0.0 else (0.0, math.inf)
+    square = b * b - a * outside
+    if square < 0.0:
+        return math.inf, -math.inf
+    root = math.sqrt(square)
+    return max((-b - root) / a, 0.0), (root - b) / a
+
+
+@kernel
+def _to_cylinder(cylinder, o, d):
+    first, last = within_circle(o[0] - cylinder[0], o[1] - cylinder[1], d, cylinder[2])
     first, last = _below(cylinder[3], o, d, first, last)
     return first if first <= last else math.inf
 

@@ -19,6 +19,7 @@ OBSTACLES = relief(
     boxes=[(6.0, 1.0, 2.0, 3.0, 0.7, 2.5), (-5.0, -4.0, 1.0, 1.0, 0.0, 4.0)],
     cylinders=[(0.0, 7.0, 1.5, 3.0)],
 )
+ALONE = (np.empty((0, 5)), np.empty((0, 7)))  # no other vehicles
 BUMPS = relief(bump_height=0.5, bump_length=8.0, boxes=[(6.0, 1.0, 2.0, 3.0, 0.7, 2.5)])
 
 
@@ -64,8 +65,9 @@ def test_depth_of_level_ground_is_height():
     out = np.empty(len(directions))
     upright = np.array([1.0, 0.0, 0.0, 0.0])
     scan.scan(
-        as_relief(LEVEL), (1, 2), 0.0, 0.0, 50.0, 0.0, 0.0, directions, np.array([1.0, 2.0, 3.0]), upright, 0, out
-    )
+        as_relief(LEVEL), (1, 2), 0.0, 0.0, 50.0, 0.0, 0.0, directions, np.array([1.0, 2.0, 3.0]), upright, 0, *ALONE,
+        out,
+    )  # fmt: skip
     np.testing.assert_allclose(out * cosines, 3.0, rtol=1e-12)
 
 
@@ -96,7 +98,7 @@ def test_noise_has_stated_deviation_and_repeats():
     for result in (out, again):
         scan.scan(
             as_relief(LEVEL), (1, 2), 0.03, 0.5, 50.0, 0.0, 0.0, down, np.array([0.0, 0.0, 5.0]),
-            np.array([1.0, 0.0, 0.0, 0.0]), 7, result,
+            np.array([1.0, 0.0, 0.0, 0.0]), 7, *ALONE, result,
         )  # fmt: skip
     np.testing.assert_array_equal(out, again)
     assert out.mean() == pytest.approx(5.0, abs=4 * 0.03 / math.sqrt(3000))
