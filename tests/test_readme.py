@@ -60,13 +60,14 @@ def _written(command):
 def _run(command, key_prefix, folder, before):
     """Run a command after the commands that write its input.
 
-    Videos have one picture per second instead of twenty: all pictures of a flight test the same code.
+    Videos have one picture per second instead of twenty, and one effect is studied instead of all: the others test the
+    same code, and each would compile a plant of its own.
     """
     for one in before:
         one.result()
     words = shlex.split(command)[1:]
     own = ["--key-prefix", key_prefix]
-    more = {"run": own, "replay": own, "render": ["--fps", "1"]}.get(words[0], [])
+    more = {"run": own, "replay": own, "render": ["--fps", "1"], "effects": ["--only", "air_density"]}.get(words[0], [])
     program = [sys.executable, "-m", "lapwing", *words, *more]
     return subprocess.run(program, cwd=folder, capture_output=True, text=True, timeout=1800)
 
