@@ -79,7 +79,8 @@ def effects(
 ) -> None:
     """Measure the cost and influence of each effect of a scene.
 
-    Lists the effects that could be omitted within --tolerance.
+    Lists the effects that could be omitted within --tolerance. In a scene of several vehicles each effect is removed
+    from all of them, or added to all; path and end are the largest changes, energy and cost are those of all vehicles.
     """
     from lapwing.cli.progress import StudyProgress
     from lapwing.services.scene_resolver import load

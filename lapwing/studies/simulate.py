@@ -43,9 +43,11 @@ def fly(
     return kind.of(*_fly(run, only, operator, rows, observe))
 
 
-def fly_each(setup: RunConfig, only: Collection[Topic], rows: dict[str, np.ndarray] | None = None) -> list[FlightData]:
+def fly_each(
+    run: RunConfig | Scene, only: Collection[Topic], rows: dict[str, np.ndarray] | None = None
+) -> list[FlightData]:
     """Return the flights of all vehicles of a run. See `fly` for arguments."""
-    return FlightData.of_each(*_fly(setup, only, no_operator, rows))
+    return FlightData.of_each(*_fly(run, only, no_operator, rows))
 
 
 def fly_with_ports(

@@ -160,6 +160,10 @@ class Scene:
         }
         return scene
 
+    def with_vehicles(self, vehicles: Sequence["Scene"]) -> "Scene":
+        """Return the scene with another version of each vehicle; the tables that all share are those of the scene."""
+        return Scene(self.path, self._tables, self._vocabulary, self.sources, locate=self._locate, vehicles=vehicles)
+
     @contextmanager
     def located(self) -> Iterator[None]:
         """Add the origin of the key to a ConfigError that is raised within the context."""

@@ -8,7 +8,6 @@ from typing import NamedTuple
 from rich.console import Console
 
 from lapwing.kernels import statistics
-from lapwing.services.common.vehicle_schema import Effects
 from lapwing.studies import json_file, terminal
 from lapwing.studies.accuracy import console_output, error_budget, round_off, scenes
 from lapwing.studies.accuracy import work_precision_plot as picture
@@ -18,6 +17,7 @@ from lapwing.studies.accuracy.round_off import RoundOff
 from lapwing.studies.accuracy.targets import find, scene_of
 from lapwing.studies.accuracy.work_precision import Point, cheapest, check_target, measure
 from lapwing.studies.effects.cost import costs
+from lapwing.studies.effects.variants import tables_of
 
 WIDTH = 120  # characters of a table without a terminal
 SLOW = 3.0  # [s] after which the reason is printed
@@ -67,7 +67,7 @@ def study(screen: Console, target: str, overrides: list[str], goal: float | None
         points = measure(problem)
         selected = None if goal is None else cheapest(points, goal)
         parts = error_budget.errors(scene) if scene else []
-        cost = costs(scene, [scene[Effects].tables])[0][:2] if scene and error_budget.has_contact(scene) else None
+        cost = costs(scene, [tables_of(scene)])[0][:2] if scene and error_budget.has_contact(scene) else None
         return Study(target, problem, points, selected, parts, round_off.measure(problem), cost)
     finally:
         notice.cancel()

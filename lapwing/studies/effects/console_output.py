@@ -18,10 +18,12 @@ MIN_BAR = 1e-6  # [m] length of the shortest bars
 
 def show(console: Console, study: Study) -> None:
     """Print the study."""
-    head = f"{study.scene}: plant step: {study.airborne:.0f} ns hovering, {study.standing:.0f} ns on the ground"
+    steps = "plant step" if len(study.vehicles) == 1 else f"plant step of all {len(study.vehicles)} vehicles"
+    head = f"{study.scene}: {steps}: {study.airborne:.0f} ns hovering, {study.standing:.0f} ns on the ground"
     console.print(head)
     _table(console, "Effects of the scene, and the change without each", study, active=True)
-    _table(console, "Effects not in the scene, and the change with each", study, active=False)
+    absent = "not in the scene" if len(study.vehicles) == 1 else "not in all vehicles"
+    _table(console, f"Effects {absent}, and the change with each", study, active=False)
     saved = 1.0 - study.smallest_airborne / study.airborne, 1.0 - study.smallest_standing / study.standing
     console.print(
         f"Smallest set within {study.within:g} m: {', '.join(study.smallest) or 'none'} "
@@ -30,7 +32,7 @@ def show(console: Console, study: Study) -> None:
     )
     console.print('Costs after "<" are below the resolution of the measurement.')
     names = ", ".join(row.name for row in study.missing)
-    console.print(f"Not in the scene, influence above {study.within:g} m: {names or 'none'}")
+    console.print(f"{absent.capitalize()}, influence above {study.within:g} m: {names or 'none'}")
 
 
 def _table(console: Console, title: str, study: Study, active: bool) -> None:
@@ -46,6 +48,10 @@ def _table(console: Console, title: str, study: Study, active: bool) -> None:
         airborne, standing = _cost(row.airborne, study.noise[0]), _cost(row.standing, study.noise[1])
         rows.add_row(row.name.replace(".", "\n  ."), airborne, ratio, standing, *_changes(row.influence))
     console.print(rows)
+    for vehicle in study.vehicles if len(study.vehicles) > 1 else ():
+        names = [r.name for r in _sorted_rows(study, active) if r.influence and r.influence.vehicle == vehicle]
+        if names:
+            console.print(f"  largest change for {vehicle}: {', '.join(names)}", soft_wrap=True)
     for row in _sorted_rows(study, active):
         if row.remark:
             console.print(f"  not flown: {row.remark}", soft_wrap=True)

@@ -11,35 +11,46 @@ import pytest
 from synthetic_flights import moved
 
 from lapwing.dynamics import effects
+from lapwing.dynamics.effects._vehicle_interaction import NeighbourState
+from lapwing.dynamics.effects.downwash import Downwash, wind_of_jets
+from lapwing.dynamics.vector import ZERO
 from lapwing.services.common.vehicle_schema import Effects
 from lapwing.services.scene_resolver import load
-from lapwing.studies.effects import console_output, procedure
+from lapwing.studies.effects import console_output, cost, procedure
 from lapwing.studies.effects.cost import Cost
 from lapwing.studies.effects.procedure import Influence, Row, Study, _smallest, influence
 from lapwing.studies.effects.procedure import study as run_study
-from lapwing.studies.effects.variants import check_effects, variant
-from lapwing.studies.simulate import fly
+from lapwing.studies.effects.variants import Change, changes, check_effects, fly_for_truth, tables_of, variant
 from lapwing.studies.terminal import console
 
-HOVER = Path(__file__).parents[3] / "lapwing/scenes/hover.toml"
+SCENES = Path(__file__).parents[3] / "lapwing/scenes"
+HOVER = SCENES / "hover.toml"
 
 
 def test_difference_of_two_flights():
-    result = influence(moved([0, 1, 2, 3]), moved([0, 1, 4, 2], power=110.0))
+    result = influence([moved([0, 1, 2, 3])], [moved([0, 1, 4, 2], power=110.0)])
     assert result.trajectory == 2.0
     assert result.final == 1.0
     assert result.energy == pytest.approx(0.1)
 
 
 def test_landed_vehicle_stays_landed():
-    assert influence(moved([0, 1, 2]), moved([0, 1, 2, 5])).final == 3.0
-    assert influence(moved([0, 1, 2, 5]), moved([0, 1])).trajectory == 4.0
+    assert influence([moved([0, 1, 2])], [moved([0, 1, 2, 5])]).final == 3.0
+    assert influence([moved([0, 1, 2, 5])], [moved([0, 1])]).trajectory == 4.0
 
 
 def test_failed_flight_has_infinite_influence():
-    result = influence(moved([0, 1]), moved([0], failure="not finite at t = 1 s"))
+    result = influence([moved([0, 1])], [moved([0], failure="not finite at t = 1 s")])
     assert result.trajectory == math.inf
     assert result.failure == "not finite at t = 1 s"
+
+
+def test_largest_influence_of_all_vehicles_is_reported():
+    reference = [moved([0, 0, 0]), moved([0, 1, 2], power=300.0)]
+    reference[1].vehicle = "right"
+    result = influence(reference, [moved([0, 0, 1]), moved([0, 4, 2], power=340.0)])
+    assert (result.trajectory, result.final, result.vehicle) == (3.0, 1.0, "right")
+    assert result.energy == pytest.approx(0.1)  # of both vehicles
 
 
 class FakePool:
@@ -49,42 +60,57 @@ class FakePool:
         self.worth = influences
 
     def fly(self, variants):
-        return iter([moved([0, sum(w for n, w in self.worth.items() if n not in tables)]) for tables in variants])
+        for (own,) in variants:
+            yield [moved([0, sum(w for n, w in self.worth.items() if n not in own)])]
 
 
 def test_smallest_set_omits_effects_that_are_small_together():
     influences = {"a": 0.001, "b": 0.004, "c": 0.008, "d": 5.0}
-    output = []
-    remaining, distance = _smallest(
-        FakePool(influences), {name: {} for name in influences}, moved([0, 0]), ["a", "b", "c"], 0.01, output.append
-    )
+    pool, tables, reference, output = FakePool(influences), ({n: {} for n in influences},), [moved([0, 0])], []
+    (remaining,), distance = _smallest(pool, tables, reference, ["a", "b", "c"], 0.01, output.append)
     assert list(remaining) == ["c", "d"]
     assert distance == pytest.approx(0.005)
     assert output == ["without a, b, c together", "without a, b together"]
-    assert (
-        _smallest(FakePool(influences), {name: {} for name in influences}, moved([0, 0]), [], 0.01, output.append)[1]
-        == 0.0
-    )
+    assert _smallest(pool, tables, reference, [], 0.01, output.append)[1] == 0.0
+
+
+def test_effect_of_some_vehicles_is_removed_there_and_added_to_others():
+    wind = {"velocity": [1.0, 0.0, 0.0]}
+    tables = {"gravity": {}}, {"gravity": {}, "wind_constant": wind}
+    assert changes(tables, ["gravity", "wind_constant", "downwash"]) == {
+        Change("gravity", True): ({}, {"wind_constant": wind}),
+        Change("wind_constant", True): ({"gravity": {}}, {"gravity": {}}),
+        Change("wind_constant", False): ({"gravity": {}, "wind_constant": wind}, tables[1]),
+        Change("downwash", False): ({"gravity": {}, "downwash": {}}, {**tables[1], "downwash": {}}),
+    }
+
+
+def test_option_of_some_vehicles_is_removed_there_and_added_to_others():
+    tables = {"dc_motor": {"inductance": 2e-5}}, {"dc_motor": {}}, {}
+    result = changes(tables, ["dc_motor"])
+    assert result[Change("dc_motor.inductance", True)] == ({"dc_motor": {}}, {"dc_motor": {}}, {})
+    added = {"dc_motor": {"inductance": effects.options("dc_motor")["inductance"]}}
+    assert result[Change("dc_motor.inductance", False)] == (tables[0], added, {})
 
 
 @pytest.mark.long
-def test_density_changes_real_flight_little():
-    scene = load(HOVER, ["run.duration=2.0"])
-    tables = dict(scene[Effects].tables)
-    first, repeated, thinner = (fly(variant(scene, t)) for t in (tables, tables, tables | {"air_density": {}}))
-    assert (first.truth.position == repeated.truth.position).all()
-    assert 0.0 < influence(first, thinner).trajectory < 0.01
-    # [J] about the ideal hover power over the efficiency, for less than 2 s
-    assert 100.0 < first.energy < 4000.0
+def test_inductance_changes_real_flight_little():
+    scene = load(HOVER, ["run.duration=1.0", "effects.dc_motor={}"])
+    tables = tables_of(scene)
+    changed = changes(tables, ["dc_motor"])[Change("dc_motor.inductance", False)]
+    first, other = (fly_for_truth(variant(scene, t)) for t in (tables, changed))
+    assert 0.0 < influence(first, other).trajectory < 0.01
+    # [J] about the ideal hover power over the efficiency, for less than 1 s
+    assert 100.0 < first[0].energy < 2000.0
 
 
 def test_invalid_effects_return_error():
     scene = load(HOVER)
-    assert check_effects(scene, {"gravity": {}, "gravity_altitude": {}}).startswith(
+    assert check_effects(scene, ({"gravity": {}, "gravity_altitude": {}},)).startswith(
         "effects.gravity_altitude: cannot be combined with"
     )
-    assert check_effects(scene, {"wind_gust": {}}).startswith("effects.wind_gust.peak: ")
-    assert check_effects(scene, scene[Effects].tables) == ""
+    assert check_effects(scene, ({"wind_gust": {}},)).startswith("effects.wind_gust.peak: ")
+    assert check_effects(scene, tables_of(scene)) == ""
 
 
 @pytest.fixture
@@ -93,7 +119,7 @@ def synthetic_flights(monkeypatch):
 
     class Same:
         def fly(self, variants):
-            return (moved([0.0, 1.0]) for _ in variants)
+            return ([moved([0.0, 1.0]) for _ in tables] for tables in variants)
 
     monkeypatch.setattr(procedure, "variant_pool", lambda scene: contextlib.nullcontext(Same()))
     monkeypatch.setattr(procedure, "costs", lambda scene, variants: [Cost(1.0, 1.0, 0.1, 0.1)] * len(variants))
@@ -121,6 +147,34 @@ def test_every_effect_of_catalogue_is_listed():
 
 
 @pytest.mark.usefixtures("synthetic_flights")
+def test_effects_between_vehicles_are_studied_in_fleet():
+    scene = load(SCENES / "fleet.toml", ["vehicle.2.effects.gyroscopic_torque={}"])
+    result = run_study(scene, 0.01, lambda *_: None)
+    assert result.vehicles == ("left", "right", "scout")
+    rows = {(row.name, row.active): row for row in result.rows}
+    assert {name for name, _ in rows} == set(effects.names())
+    assert rows["downwash", False].influence is not None
+    assert rows["collision", False].influence is not None
+    assert rows["gyroscopic_torque", True].influence is not None
+    assert rows["gyroscopic_torque", False].influence is not None
+    assert rows["shared_slung_load", False].remark.startswith("effects.shared_slung_load.mass: missing")
+
+
+def test_effect_that_fleet_cannot_have_returns_error():
+    scene = load(SCENES / "fleet.toml", ["vehicle.1.initial_position=[0.0, 2.5]"])
+    tables = tuple({**own, "collision": {}} for own in tables_of(scene))
+    assert check_effects(scene, tables).startswith("vehicle.1.initial_position: expected at least")
+
+
+def test_variant_of_fleet_has_tables_of_each_vehicle():
+    scene = load(SCENES / "fleet.toml")
+    changed = variant(scene, ({"gravity": {}}, {"gravity": {}, "body_drag": {}}, {}))
+    names = [["gravity"], ["body_drag", "gravity"], []]
+    assert [sorted(vehicle[Effects].tables) for vehicle in changed.vehicles] == names
+    assert [sorted(vehicle["effects"]) for vehicle in changed.resolved["vehicle"]] == names
+
+
+@pytest.mark.usefixtures("synthetic_flights")
 @pytest.mark.parametrize(("table", "active"), [("{}", False), ("{inductance=1e-5, braking_current=5.0}", True)])
 def test_options_of_effects_are_studied(table, active):
     scene = load(HOVER, [f"effects.dc_motor={table}", "effects.battery_thevenin={peukert_exponent=1.1}"])
@@ -131,16 +185,53 @@ def test_options_of_effects_are_studied(table, active):
     assert set(result.smallest) <= set(scene[Effects].tables)
 
 
+STACKED = """
+[run]
+duration = 2.5
+[effects.gravity]
+[effects.rotor_thrust]
+[effects.ground_contact]
+[effects.body_drag]
+[effects.downwash]
+[autopilot]
+gains = "tuned"
+estimator = "ground_truth"
+[[vehicle]]
+name = "upper"
+airframe = "delivery_drone"
+[[vehicle.trajectory.phase]]
+name = "climb"
+z = { kind = "minimum_jerk", to = 3.0, duration = 2.0 }
+[[vehicle]]
+name = "lower"
+airframe = "delivery_drone"
+initial_position = [0.0, 0.0]
+[[vehicle.trajectory.phase]]
+name = "climb"
+z = { kind = "minimum_jerk", to = 1.0, duration = 2.0 }
+"""
+
+
 @pytest.mark.long
-def test_command_shows_influence_of_motor_options(tmp_path):
-    path = tmp_path / "effects.json"
-    scene = ["hover", "--set", "effects.dc_motor={}", "--set", "run.duration=1.0", "--only", "dc_motor"]
-    command = [sys.executable, "-m", "lapwing", "effects", *scene, "--json", str(path)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=900, check=False)
+def test_command_shows_that_stacked_vehicles_need_downwash(tmp_path):
+    scene, path = tmp_path / "stacked.toml", tmp_path / "effects.json"
+    scene.write_text(STACKED)
+    command = [sys.executable, "-m", "lapwing", "effects", str(scene), "--only", "downwash,collision"]
+    done = subprocess.run([*command, "--json", str(path)], capture_output=True, text=True, timeout=900, check=False)
     assert done.returncode == 0, done.stderr
-    rows = {row["name"]: row for row in json.loads(path.read_text())["rows"]}
-    assert 0.0 < rows["dc_motor.inductance"]["influence"]["trajectory"] < 0.01
+    result = json.loads(path.read_text())
+    rows = {row["name"]: row for row in result["rows"]}
+    assert rows["downwash"]["influence"]["trajectory"] > 0.01
+    assert rows["downwash"]["influence"]["vehicle"] == "lower"
+    assert "downwash" in result["smallest"]
+    assert rows["collision"]["remark"].startswith("vehicle.1.initial_position: ")  # their spheres touch at the start
     assert "…" not in done.stdout  # no number is cut
+    distant = load(scene, ["vehicle.1.initial_position=[20.0, 0.0]"])
+    tables = tables_of(distant)
+    flights = [
+        fly_for_truth(variant(distant, t)) for t in (tables, changes(tables, ["downwash"])[Change("downwash", True)])
+    ]
+    assert influence(*flights).trajectory < 1e-6
 
 
 def study():
@@ -150,7 +241,7 @@ def study():
         Row("gyroscopic_torque", False, Influence(0.00012, 0.00011, -0.0123), -1234.5, -1234.0),
         Row("gust", False, None, math.nan, math.nan, "gust.peak: field required"),
     )
-    return Study("hover", 0.01, 80.0, 500.0, rows, ("gravity",), 0.0, 80.0, 500.0, (1.5, 3.0))
+    return Study("hover", 0.01, 80.0, 500.0, rows, ("gravity",), 0.0, 80.0, 500.0, (1.5, 3.0), ("drone1",))
 
 
 def test_table_json_and_plot(tmp_path, capsys):
@@ -173,6 +264,42 @@ def test_table_json_and_plot(tmp_path, capsys):
     assert (tmp_path / "study.png").read_bytes().startswith(b"\x89PNG")
 
 
+def test_table_of_fleet_names_vehicles(capsys):
+    rows = (
+        Row("downwash", True, Influence(2.0, 0.019, -0.06, vehicle="third"), 44.9, 1.0),
+        Row("collision", False, Influence(math.inf, math.inf, math.inf, "left: falls"), 92.4, 1.0),
+        Row("wind_boundary_layer", False, Influence(0.00012, 0.00011, -0.0123, vehicle="wing"), -1234.5, -1234.0),
+    )
+    vehicles = "leader", "wing", "third"
+    console_output.show(
+        console(80), Study("formation", 0.01, 658.0, 2258.0, rows, ("downwash",), 0.0, 6.0, 2.0, (1.5, 3.0), vehicles)
+    )
+    text = capsys.readouterr().out
+    assert "plant step of all 3 vehicles: 658 ns hovering" in text
+    assert "largest change for third: downwash\n" in text
+    assert "largest change for wing: wind_boundary_layer\n" in text
+    assert "Not in all vehicles, influence above 0.01 m: collision" in text
+    assert max(map(len, text.splitlines())) <= 80
+    assert "…" not in text
+
+
+def test_cost_of_fleet_counts_equal_vehicles_once():
+    assert [number for number, *_ in cost._calls(load(SCENES / "formation.toml"))] == [3]
+    assert [number for number, *_ in cost._calls(load(SCENES / "fleet.toml"))] == [2, 1]
+    assert [number for number, *_ in cost._calls(load(HOVER))] == [1]
+
+
+@pytest.mark.long
+def test_cost_of_fleet_includes_interactions():
+    effect, memory = Downwash(disc_radius=0.3, spread=0.113, core=0.0), (ZERO,)
+    own = NeighbourState(air_density=1.2)
+    other = NeighbourState((0.0, 0.0, 2.0), thrust_world=(0.0, 0.0, 50.0), air_density=1.2, disc_radius=0.3)
+    assert cost._with_interactions((effect,), memory, (own,), 0.01) == memory
+    (wind,) = cost._with_interactions((effect,), memory, (own, other), 0.01)
+    assert wind == wind_of_jets(effect, ZERO, own, (other,), 0.01)
+    assert wind[2] < -1.0
+
+
 def test_system_without_effects_is_rejected():
     with pytest.raises(ValueError, match=r"os4_motors.toml: the model os4 has no effects"):
-        run_study(load(HOVER.parent / "os4_motors.toml"), 0.01, print)
+        run_study(load(SCENES / "os4_motors.toml"), 0.01, print)
