@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lapwing.dynamics.vector import add, dot, scale
-from lapwing.kernels import kernel, math
+from lapwing.kernels import kernel, math, noinline
 
 UP = (-0.0, -0.0, 1.0)  # normal of level ground
 
@@ -34,7 +34,7 @@ def _cubic(a, b, c, d, p):
     return b + p * (first + p * (square + p * cube)), first + p * (2.0 * square + 3.0 * p * cube)
 
 
-@kernel
+@noinline
 def _between(t, x, y):
     """Return (height, slope along x, slope along y) of the grid by cubic convolution (theory.md, eq. (2.82)).
 
@@ -177,12 +177,9 @@ def _outward(t, ground, deepest, place, level):
     return _corner(walls, floor) if found else floor
 
 
-@kernel
-def depth(t, place):
-    """Return (depth [m] of a point, not positive outside; normal; wedge factor): theory.md, eq. (2.80) and (2.81)."""
-    height, a, b = field(t, place[0], place[1])
-    normal = _normal(a, b)
-    ground = ((height - place[2]) * normal[2], normal, 1.0)
+@noinline
+def _among_obstacles(t, ground, place):
+    """Return the result of `depth` from that of the ground without obstacles."""
     deepest, n = ground[0], t.boxes.shape[0] + t.cylinders.shape[0]
     for i in range(n):
         under, inside, _, _ = _obstacle(t, i, place)
@@ -197,6 +194,17 @@ def depth(t, place):
             if over[0] <= best[0]:
                 best = over
     return best
+
+
+@kernel
+def depth(t, place):
+    """Return (depth [m] of a point, not positive outside; normal; wedge factor): theory.md, eq. (2.80) and (2.81)."""
+    height, a, b = field(t, place[0], place[1])
+    normal = _normal(a, b)
+    ground = ((height - place[2]) * normal[2], normal, 1.0)
+    if t.boxes.shape[0] + t.cylinders.shape[0] == 0:
+        return ground
+    return _among_obstacles(t, ground, place)
 
 
 @kernel
