@@ -59,7 +59,7 @@ def changes(tables: Tables, names: Collection[str]) -> dict[Change, Tables]:
     for name in (name for name in present if name in names):
         result[Change(name, True)] = without(tables, [name])
     for name in (name for name in names if not all(name in own for own in tables)):
-        table = next((own[name] for own in tables if name in own), {})
+        table: Mapping[str, Any] = next((own[name] for own in tables if name in own), {})
         result[Change(name, False)] = tuple(own if name in own else {**own, name: table} for own in tables)
     for name in sorted(set(present).intersection(names)):
         module = next(own[name].get("module") for own in tables if name in own)
