@@ -65,8 +65,10 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     return firmware_config(scene, (ports.TRUTH, *sensors), 1, pilot)
 
 
-def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[str, ServiceConfig]:
-    """Return the configurations by vehicle name.
+def fleet(
+    shares: Mapping[str, ServiceConfig], keys: Mapping[str, str], scenes: Mapping[str, Scene]
+) -> dict[str, ServiceConfig]:
+    """Return the configurations by vehicle name. See `plant.resolve.fleet` for arguments.
 
     Raises:
         ConfigError: two vehicles have the same ports, which the firmware does not make configurable.

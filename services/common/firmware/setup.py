@@ -97,12 +97,12 @@ def firmware_config(scene: Scene, inputs: tuple[str, ...], period: int, own: Any
     return ServiceConfig(setup, tuple(InputPort(name) for name in dict.fromkeys(names)), tuple(outputs))
 
 
-def fleet(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict[str, ServiceConfig]:
+def fleet(
+    shares: Mapping[str, ServiceConfig], keys: Mapping[str, str], scenes: Mapping[str, Scene]
+) -> dict[str, ServiceConfig]:
     """Return the configurations by vehicle name, with an instance for each that has none.
 
-    Args:
-        shares: configuration by vehicle name.
-        keys: prefix of each vehicle's scene keys.
+    See `plant.resolve.fleet` for arguments.
     """
     names = list(keys)
     return {
