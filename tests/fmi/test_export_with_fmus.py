@@ -93,6 +93,7 @@ def test_package_has_digest_of_scene(folder: Path) -> None:
 
 
 @pytest.mark.long
+@pytest.mark.long
 def test_exchanged_fmu_of_package_has_digest_of_scene(folder: Path) -> None:
     """Without its annotation the FMU of the battery takes connections and start values from the package."""
     package = folder / "exchanged.ssp"

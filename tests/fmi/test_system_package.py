@@ -65,6 +65,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.mark.long
+@pytest.mark.long
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_exported_package_flies_with_bits_of_scene(folder: Path, fmi: int) -> None:
     log = folder / f"native{fmi}.mcap"

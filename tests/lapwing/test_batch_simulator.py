@@ -54,6 +54,7 @@ def test_members_are_stepped_in_vector_registers(batch):
         assert re.search(r"fmul <\d+ x double>", str(compiled.library._get_module_for_linking()))
 
 
+@pytest.mark.long
 def rows(state):
     return np.column_stack(state[1:6])
 

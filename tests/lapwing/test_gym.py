@@ -51,6 +51,7 @@ def test_env_checker_passes_without_warning(task):
 
 
 @pytest.mark.long
+@pytest.mark.long
 @pytest.mark.parametrize("task", TASKS)
 def test_observations_stay_within_bounds_under_random_actions(task):
     environments, random = many(task, 20), np.random.default_rng(4)

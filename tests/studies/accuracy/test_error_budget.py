@@ -43,6 +43,7 @@ def test_flight_in_memory_moves_plant():
 
 
 @pytest.mark.long
+@pytest.mark.long
 def test_errors_decrease_with_step_rate_and_delay():
     scene = load(ROOT / "lapwing/scenes/cooperative_load.toml", ["run.duration=1.0", "solver.integrator=rkmk2"])
     parts = errors(scene)
