@@ -1,12 +1,14 @@
 """Body of a vehicle as the rays of other vehicles' sensors meet it: an upright cylinder (theory.md, eq. (3.52))."""
 
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from lapwing.dynamics.lie.quaternion import Quaternion, rotate_back
 from lapwing.dynamics.terrain.ray_casting import between, within_circle
 from lapwing.dynamics.vector import Vec3, dot, subtract
-from lapwing.dynamics.vehicles.airframe import Airframe
 from lapwing.kernels import kernel, math
+
+if TYPE_CHECKING:
+    from lapwing.dynamics.vehicles.airframe import Airframe
 
 UNKNOWN_ROTOR = 0.4  # radius of a rotor without [propeller] over the distance of its hub, as the 3D view draws it
 HALF_HEIGHT = 0.1  # chosen: height of motors, blades and frame above and below the hubs over the body's radius
@@ -22,7 +24,7 @@ class VisibleBody(NamedTuple):
     top: float  # [m]
 
 
-def visible_body(airframe: Airframe) -> VisibleBody:
+def visible_body(airframe: "Airframe") -> VisibleBody:
     """Return the cylinder of an airframe whose positions are relative to the vehicle's origin."""
     hubs = airframe.rotors.position
     x, y = (math.total(hub[k] for hub in hubs) / len(hubs) for k in (0, 1))
