@@ -34,7 +34,7 @@ def commands(plans: list[str], loaded: "Scene") -> Mapping[str, tuple[Any, ...]]
     from lapwing.services.common.flight_plan_file import read
     from lapwing.services.common.vehicle_schema import start_height
 
-    scenes = {scene.lookup("vehicle.name"): scene for scene in loaded.vehicles or (loaded,)}
+    scenes = {scene.lookup("vehicle.name"): scene for scene in loaded.each_vehicle}
     return {
         name: tuple(read(path, start_height(scenes[name]), environment(scenes[name]).home))
         for name, path in files(plans, loaded).items()

@@ -17,7 +17,7 @@ def with_solver_selected(path: Path, overrides: list[str]) -> "Scene":
     from lapwing.studies.metrics import check_success
 
     scene = load(path, overrides)
-    for vehicle in scene.vehicles or (scene,):
+    for vehicle in scene.each_vehicle:
         check_success(vehicle)
     accuracy = accuracy_to_select_for(scene)
     if accuracy is None:
@@ -33,7 +33,7 @@ def warn_of_gains(scene: "Scene") -> None:
     """Print a warning for each unstable control loop."""
     from lapwing.services.autopilot.stability_check import unstable_loops
 
-    for vehicle in scene.vehicles or (scene,):
+    for vehicle in scene.each_vehicle:
         prefix = f"{vehicle.lookup('vehicle.name')}: " if scene.vehicles else ""
         for line in unstable_loops(vehicle):
             typer.echo(f"lapwing: warning: {prefix}{line}", err=True)
@@ -43,7 +43,7 @@ def warn_of_round_off(scene: "Scene") -> None:
     """Print a warning for each vehicle whose substeps in contact reach round-off before its accuracy."""
     from lapwing.services.plant.schema import Solver, limited_by_round_off
 
-    for vehicle in scene.vehicles or (scene,):
+    for vehicle in scene.each_vehicle:
         if limit := limited_by_round_off(vehicle):
             (name, least), accuracy = limit, vehicle[Solver].accuracy
             message = f"substeps of {name} are limited by round-off, and {accuracy:g} may be missed in contact"
@@ -55,7 +55,7 @@ def check_firmware_program(scene: "Scene") -> None:
     from lapwing.dynamics.config_error import ConfigError
     from lapwing.services.common.firmware.schema import TABLE, flown_by_firmware
 
-    for vehicle in filter(flown_by_firmware, scene.vehicles or (scene,)):
+    for vehicle in filter(flown_by_firmware, scene.each_vehicle):
         keys = vehicle.section(TABLE)
         folder = Path(keys.directory or ".")
         if not folder.is_dir():

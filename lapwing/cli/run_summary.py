@@ -180,7 +180,7 @@ def compare_with_campaign(options: RunOptions, flights: Sequence[Flight]) -> Non
 
 def check_success(scene: Scene, flights: Sequence[Flight]) -> None:
     """Exit with 4 if a flight does not meet success.require of the scene."""
-    for flight, vehicle in zip(flights, scene.vehicles or (scene,), strict=False):
+    for flight, vehicle in zip(flights, scene.each_vehicle, strict=False):
         if unmet := vehicle[Success].unmet(metrics(flight)):
             vehicle_text = f" of {flight.vehicle}" if scene.vehicles else ""
             fail(

@@ -79,7 +79,7 @@ def check(
         typer.echo(f"{scene}: ok")
         warn_of_gains(loaded)
         warn_of_round_off(loaded)
-        for each in loaded.vehicles or (loaded,):
+        for each in loaded.each_vehicle:
             vehicle = each[Vehicle]
             lines += [
                 ("vehicle", f"{vehicle.name}, {vehicle.airframe or vehicle.model}"),

@@ -78,7 +78,7 @@ def form(scene: Scene, schema: Schema) -> list[Group]:
 
 def additions(scene: Scene, schema: Schema) -> list[tuple[str, str]]:
     """Return key and meaning of the tables that can be added: effects and sensors that the scene lacks."""
-    present = [vehicle.resolved for vehicle in scene.vehicles or (scene,)]
+    present = [vehicle.resolved for vehicle in scene.each_vehicle]
     return [
         (f"{name}.{key}", str(part.get("description", "")))
         for name in EXTENSIBLE

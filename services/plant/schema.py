@@ -81,7 +81,7 @@ class Solver(SceneTable):
 
 def accuracy_to_select_for(scene: Scene) -> float | None:
     """Return the smallest accuracy of a scene's vehicles; None if one of them sets a step, or no accuracy."""
-    solvers = [vehicle[Solver] for vehicle in scene.vehicles or (scene,)]
+    solvers = [vehicle[Solver] for vehicle in scene.each_vehicle]
     return min(s.accuracy or math.inf for s in solvers) if all(s.undecided for s in solvers) else None
 
 

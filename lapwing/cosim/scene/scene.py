@@ -160,6 +160,11 @@ class Scene:
         }
         return scene
 
+    @property
+    def each_vehicle(self) -> tuple["Scene", ...]:
+        """Scene of each vehicle; of a single vehicle the scene itself."""
+        return self.vehicles or (self,)
+
     def with_vehicles(self, vehicles: Sequence["Scene"]) -> "Scene":
         """Return the scene with another version of each vehicle; the tables that all share are those of the scene."""
         return Scene(self.path, self._tables, self._vocabulary, self.sources, locate=self._locate, vehicles=vehicles)

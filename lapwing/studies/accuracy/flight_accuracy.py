@@ -83,7 +83,7 @@ def measure(scene: Scene, progress: Progress, step_selected: bool = False) -> Fl
         SceneError: the scene has no accuracy.
         ValueError: a flight fails, or a foreign firmware flies.
     """
-    solver = (scene.vehicles or (scene,))[0][Solver]
+    solver = scene.each_vehicle[0][Solver]
     if solver.accuracy is None:
         raise SceneError("solver.accuracy", MISSING, source=KeyOrigin(scene.path))
     setup = resolve(scene)
@@ -147,7 +147,7 @@ def measure_recorded(
 
 def _finer(scene: Scene, accuracy: float) -> tuple[float, list[str]]:
     """Return the step [s] of the finer flight and its overrides."""
-    solver = (scene.vehicles or (scene,))[0][Solver]
+    solver = scene.each_vehicle[0][Solver]
     step = scene[Communication].interval / (FINER * solver.steps(scene[Communication]))
     return step, [f"solver.step={step!r}", f"solver.accuracy={max(STRICTER * accuracy, STRICTEST)!r}"]
 

@@ -40,7 +40,7 @@ def overrides(scene: Scene, notify: Callable[[str], None]) -> list[str]:
     accuracy = accuracy_to_select_for(scene)
     if accuracy is None:
         return []
-    distinct = {repr(scenes.physics(vehicle)): vehicle for vehicle in scene.vehicles or (scene,)}.values()
+    distinct = {repr(scenes.physics(vehicle)): vehicle for vehicle in scene.each_vehicle}.values()
     try:
         selected = cheapest(
             _combine_vehicles([_expected_points(vehicle, accuracy, notify) for vehicle in distinct]), accuracy

@@ -134,7 +134,7 @@ def manifest(plan: Plan, reference: Reference) -> dict[str, Any]:
         "sources": sources(plan),
         "vehicles": vehicles(plan),
         "published": {} if scene.vehicles else scene[Published].resolved(),
-        "success": list(dict.fromkeys(text for each in scene.vehicles or (scene,) for text in each[Success].require)),
+        "success": list(dict.fromkeys(text for each in scene.each_vehicle for text in each[Success].require)),
         **reference._asdict(),
     }
     return json.loads(json.dumps(data))

@@ -29,7 +29,7 @@ from lapwing.kernels.cell import Cell
 from lapwing.kernels.codegen import compile_source, generic
 from lapwing.services.common.vehicle_schema import active, airframe, rotor_constants, start_height
 from lapwing.services.plant.schema import Solver, method
-from lapwing.studies.effects.variants import Tables, variant, vehicles_of
+from lapwing.studies.effects.variants import Tables, variant
 
 STEPS = 2000  # steps in one timed call
 ROUNDS = 60  # calls of each variant, interleaved so that disturbances affect all variants
@@ -111,9 +111,9 @@ def _cost(times: np.ndarray, numbers: list[int]) -> Cost:
 
 def _calls(scene: Scene) -> list[tuple[int, Any, Any]]:
     """Return (number of equal vehicles, call in the air, call on the ground) of each distinct vehicle."""
-    plants = [_plant(vehicle) for vehicle in vehicles_of(scene)]
+    plants = [_plant(vehicle) for vehicle in scene.each_vehicle]
     distinct: dict[str, list[Any]] = {}
-    for plant, vehicle in zip(plants, vehicles_of(scene), strict=True):
+    for plant, vehicle in zip(plants, scene.each_vehicle, strict=True):
         others = plants if interacts(plant.p.effects) else []
         fleet = [plant, *(other for other in others if other is not plant and interacts(other.p.effects))]
         distinct.setdefault(repr(fleet), [vehicle, fleet, 0])[2] += 1

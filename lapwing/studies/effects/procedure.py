@@ -21,7 +21,6 @@ from lapwing.studies.effects.variants import (
     names_of,
     tables_of,
     variant_pool,
-    vehicles_of,
     without,
 )
 from lapwing.studies.flight_data import FlightData
@@ -118,7 +117,7 @@ def study(
     Raises:
         ValueError: a vehicle's model has no effects, `only` has an unknown one, or the flight of the scene fails.
     """
-    vehicles = vehicles_of(scene)
+    vehicles = scene.each_vehicle
     for vehicle in vehicles:
         if not vehicle.has(Autopilot):
             raise ValueError(f"{scene.path}: the model {vehicle[Vehicle].model} has no effects; expected a multirotor")

@@ -29,14 +29,9 @@ class Change(NamedTuple):
     removed: bool
 
 
-def vehicles_of(scene: Scene) -> tuple[Scene, ...]:
-    """Return the scene of each vehicle."""
-    return scene.vehicles or (scene,)
-
-
 def tables_of(scene: Scene) -> Tables:
     """Return the tables of the effects of each vehicle."""
-    return tuple(vehicle[Effects].tables for vehicle in vehicles_of(scene))
+    return tuple(vehicle[Effects].tables for vehicle in scene.each_vehicle)
 
 
 def names_of(tables: Tables) -> list[str]:
@@ -84,7 +79,7 @@ def variant(scene: Scene, tables: Tables) -> Scene:
     """Return the scene with these effects instead of its own."""
     vehicles = [
         vehicle.replaced(Effects.model_validate(dict(own)))
-        for vehicle, own in zip(vehicles_of(scene), tables, strict=True)
+        for vehicle, own in zip(scene.each_vehicle, tables, strict=True)
     ]
     return scene.with_vehicles(vehicles) if scene.vehicles else vehicles[0]
 
