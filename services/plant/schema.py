@@ -17,9 +17,9 @@ MANY_SUBSTEPS = 1e-4  # accuracy below which the share decreases with the number
 LEAST_CONTACT_TOLERANCE = 1e-15  # below it a difference of two substeps is round-off, and no substep is short enough
 
 # accuracies below which substeps are limited by round-off, by effect or model
-LEAST_ACCURACIES = {"ground_contact": 4e-10, "unloading": 3.4e-8, "shared_slung_load": 1.3e-7}
+LEAST_ACCURACIES = {"ground_contact": 4e-10, "unloading": 6.7e-9, "shared_slung_load": 2e-8}
 
-PART_SHARE, PART_TOLERANCE = 3e-5, 1e-5  # for systems with their own contacts; tolerance without an accuracy
+PART_SHARE, PART_TOLERANCE = 1.5e-5, 1e-5  # for systems with their own contacts; tolerance without an accuracy
 
 
 def contact_tolerance(accuracy: float) -> float:

@@ -20,6 +20,7 @@ from lapwing.dynamics.integrators._compensated import (
     add,
     exact,
     extrapolate,
+    is_compensated,
     rounded,
     value_of,
 )
@@ -52,6 +53,7 @@ __all__ = [
     "integrate_adaptive",
     "integrate_fixed",
     "integrate_step_doubling",
+    "is_compensated",
     "names",
     "not_finite",
     "rate",

@@ -7,6 +7,8 @@ Geometric Numerical Integration, section VIII.5.
 import sys
 from typing import Any, NamedTuple
 
+from numba import types
+
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import generic
 from lapwing.kernels.state_tree import axpy, normalise, rounding_error, scale
@@ -32,6 +34,11 @@ def exact(summation, method, x):
     return lambda summation, method, x: x
 
 
+def is_compensated(x: types.Type) -> bool:
+    """Return True if the type of a state is that of a CompensatedSum."""
+    return getattr(x, "instance_class", None) is CompensatedSum
+
+
 @always_inline
 def add(x, v):
     """Return the CompensatedSum x + v for a tree v of numbers."""
@@ -49,19 +56,19 @@ def difference(x, y):
 @generic(inline=True)
 def value_of(x):
     """Return the value of a CompensatedSum; any other tree itself."""
-    return (lambda x: x.value) if x.instance_class is CompensatedSum else (lambda x: x)
+    return (lambda x: x.value) if is_compensated(x) else (lambda x: x)
 
 
 @generic(inline=True)
 def rounded(x):
     """Return the state on the manifold that a CompensatedSum is nearest to; any other tree itself."""
-    return (lambda x: normalise(x.value)) if x.instance_class is CompensatedSum else (lambda x: x)
+    return (lambda x: normalise(x.value)) if is_compensated(x) else (lambda x: x)
 
 
 @generic(inline=True)
 def extrapolate(method, halves, whole):
     """Return the result of two half steps without the leading term of its error (theory.md, eq. (2.33))."""
     share = 1.0 / (2.0 ** sys.modules[method.instance_class.__module__].ORDER - 1.0)
-    if halves.instance_class is CompensatedSum:
+    if is_compensated(halves):
         return lambda method, halves, whole: add(halves, scale(share, difference(halves, whole)))
     return lambda method, halves, whole: normalise(axpy(share, axpy(-1.0, whole, halves), halves))

@@ -6,7 +6,16 @@ from typing import Any, NamedTuple
 
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.effects import _stiff_effects as stiff_effects
-from lapwing.dynamics.integrators import SHORTEST, CompensatedSum, add, exact, extrapolate, rounded, value_of
+from lapwing.dynamics.integrators import (
+    SHORTEST,
+    CompensatedSum,
+    add,
+    exact,
+    extrapolate,
+    is_compensated,
+    rounded,
+    value_of,
+)
 from lapwing.dynamics.vehicles.multirotor_equations import (
     FORMS,
     MultirotorDrive,
@@ -29,7 +38,7 @@ FASTEST_LAG = 1.0  # largest product of lag rate and step without substeps: ever
 @generic(inline=True)
 def _step(method, drive, t, x, h):
     module = sys.modules[method.instance_class.__module__]
-    if x.instance_class is CompensatedSum:
+    if is_compensated(x):
         return _compensated_step(module.increment, FORMS[x.types[0].instance_class])
     one_step, form = module.step, FORMS[x.instance_class]
     its_rate, project = form.rate, form.project
@@ -136,7 +145,7 @@ def _growth(error, allowed):
 @generic(inline=True)
 def _origin(x, t):
     """Return the moment from which time is counted, so that its sum does not round off: t for compensated sums."""
-    return (lambda x, t: t) if x.instance_class is CompensatedSum else (lambda x, t: 0.0)
+    return (lambda x, t: t) if is_compensated(x) else (lambda x, t: 0.0)
 
 
 @never_inlined
