@@ -1,7 +1,12 @@
-"""Synthetic flight for the 3D view, and a fake viser scene."""
+"""Synthetic flights for the 3D view, and a fake viser scene."""
+
+import copy
 
 import numpy as np
 import synthetic_flights
+
+from lapwing.studies.flight_data import FlightData
+from lapwing.studies.topic_view import TopicView
 
 TICKS, RATE = 400, 100
 T = np.arange(TICKS) / RATE
@@ -54,3 +59,21 @@ class Recorder:
             return handle
 
         return add
+
+
+def fleet():
+    """Return two vehicles, the second 4 m north of the first."""
+    first = flight()
+    truth = {name: first.truth[name] for name in first.truth.fields}
+    truth["pose.position"] = first.truth.position + np.array([0.0, 4.0, 0.0])
+    second = FlightData({"ground_truth": TopicView(np.arange(TICKS) * 10**7, truth)}, copy.copy(first.origin))
+    second.vehicle = "second"
+    first.others = (second,)
+    first.fleet = {"second": second.truth, first.vehicle: first.truth}
+    return first
+
+
+def volume(solid):
+    """Return the volume inside the faces of a solid."""
+    a, b, c = (solid.vertices[solid.faces[:, i]] for i in range(3))
+    return float(np.einsum("ij,ij->i", a, np.cross(b, c)).sum() / 6.0)
