@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from lapwing.messages import Point, Pose, VehicleState, header
 from tests.cosim.memory_log import fly
 from tests.golden import digests, thinned_log
 from tests.golden.cases import CASES
@@ -81,3 +82,14 @@ def test_added_and_removed_topics_are_named(flown):
     assert thinned_log.first_difference(gone, flown) == [f"/{flown.setup.vehicle}/more: this topic is gone"]
     del kept["/tf"]
     assert thinned_log.first_difference(kept, flown) == ["/tf: this topic is new"]
+
+
+def test_difference_is_that_of_same_vehicle():
+    """A topic of a fleet has several messages of one time."""
+    left, right, moved = (
+        VehicleState(header(0, frame), Pose(Point(x, 0.0, 0.0))).encode()
+        for frame, x in (("left", 1.0), ("right", 2.0), ("right", 3.0))
+    )
+    kept = thinned_log.TopicSample(1, [], [], [(0, VehicleState.type_name, right)])
+    ((_, line),) = thinned_log._fields("/tf", kept, [(0, left), (0, moved)], math.inf)
+    assert "pose.position.x was 2.0, is 3.0, by 1" in line

@@ -103,7 +103,7 @@ def first_difference(old: Sample, new: MemoryLog, whole: bool = True) -> list[st
     for name in sorted(old.keys() & names.keys()):
         messages = [(tick * new.setup.interval_ns, payload) for tick, payload in new.payloads(names[name])]
         began += _began(name, old[name], messages, end_ns)
-        fields += _fields(name, old[name], dict(messages), end_ns)
+        fields += _fields(name, old[name], messages, end_ns)
     if began:
         last_alike, at_or_before, name = min(began)
         since = f"after t = {last_alike * 1e-9:g} s, " if last_alike >= 0 else ""
@@ -130,17 +130,22 @@ def _began(
         yield alike, messages[-1][0], name
 
 
-def _fields(name: str, old: TopicSample, new: dict[int, bytes], end_ns: float) -> Iterator[tuple[int, str]]:
+def _fields(name: str, old: TopicSample, messages: list[tuple[int, bytes]], end_ns: float) -> Iterator[tuple[int, str]]:
     """Yield (instant, line) of the first sampled message that differs, up to `end_ns`."""
+    new: dict[int, list[bytes]] = {}
+    for time_ns, payload in messages:
+        new.setdefault(time_ns, []).append(payload)
     for time_ns, kind, was in old.kept:
-        now = new.get(time_ns)
-        if now == was or time_ns > end_ns:
+        now = new.get(time_ns, [])
+        if was in now or time_ns > end_ns:
             continue
         where = f"{name} at t = {time_ns * 1e-9:g} s: "
-        if now is None:
+        if not now:
             yield time_ns, where + "there is no such message any more"
             return
-        result = first_field(message_class(kind), was, now)
+        # a topic of a fleet has a message of each vehicle: those of other vehicles differ in a name
+        results = [first_field(message_class(kind), was, payload) for payload in now]
+        result = next((r for r in results if r and r.delta is not None), results[0])
         assert result
         by = f", by {result.delta:.3g}" if result.delta is not None else ""
         yield time_ns, where + f"{result.field or 'length'} was {result.one!r}, is {result.other!r}{by}"
