@@ -76,8 +76,10 @@ def _limits(low: Any, high: Any, voltage: Any, flying: Any, least: float, most: 
 def description(low: np.ndarray, high: np.ndarray, highest: float) -> str:
     """Return a text of the motors at each limit, given their flags, shape (n, motors): "motor 2 at 40 V"."""
     limits = ((low, "0 V"), (high, f"{highest:g} V"))
-    parts = [f"{_motors(np.flatnonzero(at.any(axis=0)) + 1)} at {limit}" for at, limit in limits if at.any()]
-    return ", ".join(parts)
+    found = [(_motors(at.any(axis=0)), limit) for at, limit in limits if at.any()]
+    if len(found) == 2 and found[0][0] == found[1][0]:
+        return f"{found[0][0]} at {found[0][1]} and {found[1][1]}"
+    return ", ".join(f"{motors} at {limit}" for motors, limit in found)
 
 
 def spans(result: Saturation, t: np.ndarray, highest: float) -> list[tuple[str, float, float]]:
@@ -92,7 +94,10 @@ def spans(result: Saturation, t: np.ndarray, highest: float) -> list[tuple[str, 
     return listed
 
 
-def _motors(numbers: np.ndarray) -> str:
+def _motors(affected: np.ndarray) -> str:
+    numbers = np.flatnonzero(affected) + 1
+    if len(numbers) == len(affected) > 1:
+        return "all motors"
     return f"motor{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))}"
 
 
