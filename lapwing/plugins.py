@@ -3,7 +3,7 @@
 - controllers: `VehicleModel`, `StateEstimate`, `Setpoint`, `ThrustAndMoments`, `MotorVoltages`
 - estimators: `VehicleModel`, `StateEstimate` and the readings of the sensors
 - effects: the hooks (`wrench`, `air`, `loads`, ...), `EffectInputs`, `Motion`, `Air`, ...
-- sensors: `TrueState`, random numbers (`normal`, `uniform`)
+- sensors: `Truth` with the `OtherVehicle`s of a fleet, random numbers (`normal`, `uniform`), `reduce_tuple`
 - trajectory segments: `Segment`, `Piece`, and the types of keys `Finite` and `Positive`
 - MAVLink messages: `stream` declares one, `mavlink` has the message classes
 - compiled code: `kernel`, `python_function`, vectors and rotations
@@ -32,6 +32,7 @@ _MODULES = {
         *("norm", "scale", "subtract", "transpose"),
     ),
     "lapwing.kernels": ("kernel", "python_function"),
+    "lapwing.kernels.codegen": ("reduce_tuple",),
     "lapwing.services.common.controller_api": ("MotorVoltages", "ThrustAndMoments", "VehicleModel"),
     "lapwing.services.common.ports": (
         *("AirspeedReading", "BarometerReading", "BatteryReading", "DistanceReading", "GpsReading", "ImuReading"),
@@ -39,6 +40,7 @@ _MODULES = {
     ),
     "lapwing.services.common.mavlink.dialect": ("mavlink",),
     "lapwing.services.mavlink.telemetry.message_stream": ("stream",),
+    "lapwing.services.sensors.sensor_inputs": ("OtherVehicle", "Truth"),
     "lapwing.services.trajectory.polynomial_piece": ("Piece",),
     "lapwing.services.trajectory.segments.segment": ("Finite", "Positive", "Segment"),
 }

@@ -7,13 +7,16 @@ from typing import Any
 
 import numba
 
+from lapwing.cosim.config import user_module
 from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.diagram.multi_vehicle import neighbour_port
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.noise import stream_key
 from lapwing.dynamics.terrain.ray_casting import as_relief, steepness
+from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles.visible_body import VisibleBody, visible_body
 from lapwing.services.common import ports
 from lapwing.services.common.communication_schema import Communication, ticks
@@ -28,7 +31,7 @@ from lapwing.services.sensors.registry import module_of, parameters
 from lapwing.services.sensors.rotor_vibration import Damage
 from lapwing.services.sensors.scan import ScanPose, VehiclePose
 from lapwing.services.sensors.schema import Sensors
-from lapwing.services.sensors.sensor_inputs import Truth
+from lapwing.services.sensors.sensor_inputs import OtherVehicle, Truth
 from lapwing.services.sensors.service import SensorsSetup
 
 READINGS = {
@@ -142,13 +145,14 @@ def trial_reading(name: str, table: Mapping[str, Any], p: Any) -> Any:
         ConfigError: it cannot be sampled, or its types differ from the declared ones.
     """
     module, where = module_of(name, table), f"sensors.{name}.module"
-    key = stream_key(0, "trial", name)
+    key, truth = stream_key(0, "trial", name), Truth()
+    if hasattr(module, "SEES_VEHICLES"):
+        truth = truth._replace(others=(OtherVehicle(ZERO, NO_ROTATION, VisibleBody(0.0, 0.0, 1.0, 0.0, 1.0)),))
     try:
-        state = module.initial(p, key, Truth())
-        after, reading = module.sample(p, state, key, 0, Truth())
-    except Exception as error:
-        text = str(error).strip().partition("\n")[0]
-        raise ConfigError(where, f"{type(error).__name__}: {text}") from error
+        state = module.initial(p, key, truth)
+        after, reading = module.sample(p, state, key, 0, truth)
+    except user_module.FAULTS as error:
+        raise ConfigError(where, user_module.blame(error, module)) from error
     for value_name, result, declared in (
         ("initial", state, module.blank()),
         ("sample's state", after, module.blank()),

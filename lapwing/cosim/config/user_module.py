@@ -12,6 +12,7 @@ import hashlib
 import importlib
 import importlib.util
 import os
+import re
 import shutil
 import sys
 import tempfile
@@ -186,9 +187,22 @@ def _folder_of_this_process() -> Path:
 
 
 def blame(error: BaseException, module: ModuleType) -> str:
-    """Return the message of an exception, with the last line of the module in its traceback."""
-    file = getattr(module, "__file__", None)  # None for code of an interactive prompt
+    """Return the message of an exception, with the last line of the module in its traceback or compile error."""
+    text, file = str(error).strip(), getattr(module, "__file__", None)  # None for code of an interactive prompt
     lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
     where = f" ({Path(str(file)).name}, line {lines[-1]})" if lines else ""
-    message = str(error).strip().partition("\n")[0]
+    message = text.partition("\n")[0]
+    if found := _SOURCE_LINE.search(text):
+        message, where = _compiler_message(text[: found.start()]), f" ({Path(found[1]).name}, line {found[2]})"
     return f"{type(error).__name__}{': ' if message else ''}{message}{where}"
+
+
+_SOURCE_LINE = re.compile(r'^ *File "([^"]+)", line (\d+)', re.MULTILINE)  # in a message of numba's compiler
+_CONTEXT = ("Failed in", "During:", "raised from", "With argument", "Rejected", "- Of which", "Overload", ">>>")
+
+
+def _compiler_message(text: str) -> str:
+    """Return the innermost cause in a message of numba's compiler, which lists the callers' failures first."""
+    lines = [line.strip() for line in text.splitlines()]
+    causes = [line for line in lines if line and not line.startswith(_CONTEXT)]
+    return causes[-1].removeprefix("TypingError: ") if causes else lines[0]

@@ -14,7 +14,7 @@ from lapwing.services.mavlink.telemetry.message_stream import STREAMS
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 from lapwing.services.scene_resolver import load, resolve
 
-GUIDE = Path("docs/guides/extensions.md").read_text()
+GUIDE = Path("docs/guides/extensions.md").read_text().partition("## MAVLink messages")[2]
 MODULE = re.search(r"```python\n(.*?)```", GUIDE, re.DOTALL)[1].replace("estimate.angles[0]", "0.25")
 NUMBER = 251  # NAMED_VALUE_FLOAT
 
