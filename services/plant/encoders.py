@@ -28,6 +28,7 @@ from lapwing.messages import (
 from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import quaternion_columns, stamp_columns
 from lapwing.services.common import ports
+from lapwing.services.common.encoders import pose_columns
 from lapwing.services.common.ports import BatteryReading, BodyMotions, ContactForces, TrueState
 
 WORLD = "world"
@@ -44,12 +45,12 @@ class PlantWiring(NamedTuple):
     bodies: tuple[str, ...]  # names, in the order of the port
 
 
-def wires(setup: RunConfig, wiring: PlantWiring) -> list[TopicEncoder]:
+def topic_encoders(setup: RunConfig, wiring: PlantWiring) -> list[TopicEncoder]:
     """Return the encoders of the plant's topics."""
     truth, declared_ports, every = setup.port(ports.TRUTH), setup.ports, wiring.pose_every
     result = [
         TopicEncoder(topic.TRUTH, ports.TRUTH, 1, _truth, lambda: _truth_sample(truth.like)),
-        TopicEncoder(topic.POSE, ports.TRUTH, every, _pose, lambda: PoseStamped(header(0, WORLD))),
+        TopicEncoder(topic.POSE, ports.TRUTH, every, pose_columns, lambda: PoseStamped(header(0, WORLD))),
         TopicEncoder(topic.TF, ports.TRUTH, every, _transform, lambda: _transform_sample(setup.vehicle)),
         TopicEncoder(topic.CLOCK, ports.TRUTH, every, lambda _, time_ns: stamp_columns(time_ns, "clock"), Clock),
     ]
@@ -81,16 +82,10 @@ def _truth_sample(like: TrueState) -> Any:
     )
 
 
-def _pose(x: TrueState, time_ns: np.ndarray) -> Fields:
-    """Return the fields of the body's pose in the world."""
-    pose = {"pose.position": x.position_world, "pose.orientation": quaternion_columns(x.attitude)}
-    return {**stamp_columns(time_ns), **pose}
-
-
 def _truth(x: TrueState, time_ns: np.ndarray) -> Fields:
     """Return the fields of the true state."""
     return {
-        **_pose(x, time_ns),
+        **pose_columns(x, time_ns),
         "velocity": x.velocity_world,
         "angular_velocity": x.omega_body,
         "acceleration": x.acceleration_world,

@@ -90,19 +90,19 @@ def primary_topic(setup: RunConfig, topic: Topic) -> Topic:
 def merge_services(name: str, services: Sequence[tuple[RunConfig, Service]]) -> Service:
     """Return a service with the blocks of all vehicles; `services` has the configuration and service of each."""
     fleet = Service(name, [], [])
-    parts, wires, python_topics = [], [], []
+    parts, encoders, python_topics = [], [], []
     clocks = 0
     for member, service in services:
         vehicle = member.vehicle
         parts += [_part(member, part) for part in service.parts]
-        for wire in service.wires:
-            clocks += wire.topic is CLOCK
-            if wire.topic is not CLOCK or clocks == 1:  # the clocks of all vehicles are equal
-                topic, port = of_vehicle(wire.topic, vehicle), qualified_name(vehicle, wire.port)
-                wires.append(replace(wire, topic=topic, port=port))
+        for encoder in service.encoders:
+            clocks += encoder.topic is CLOCK
+            if encoder.topic is not CLOCK or clocks == 1:  # the clocks of all vehicles are equal
+                topic, port = of_vehicle(encoder.topic, vehicle), qualified_name(vehicle, encoder.port)
+                encoders.append(replace(encoder, topic=topic, port=port))
         service.messages = _Outbox(fleet, vehicle)
         python_topics += [of_vehicle(topic, vehicle) for topic in service.python_topics]
-    fleet.parts, fleet.wires, fleet.python_topics = parts, wires, python_topics
+    fleet.parts, fleet.encoders, fleet.python_topics = parts, encoders, python_topics
     return fleet
 
 
