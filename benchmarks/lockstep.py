@@ -28,11 +28,11 @@ from lapwing.cosim.transport.session_settings import mesh
 from lapwing.kernels.row_packing import pack_row
 from lapwing.services.common import ports
 from lapwing.services.common.ports import MotorCommand, Setpoint, TrueState
-from lapwing.services.plant.encoders import PlantWiring, topic_encoders
+from lapwing.services.plant.encoders import PlantEncoding, topic_encoders
 from lapwing.services.trajectory.resolve import LEAD
 
 HOPS = 3
-NONE = PlantWiring(5, False, 0, 0.0, ())
+NONE = PlantEncoding(5, False, 0, 0.0, ())
 PARTS = {  # inputs and ports of the mission's services
     "plant": (
         (InputPort(ports.ACTUATORS, 1),),

@@ -54,7 +54,7 @@ def create(setup: RunConfig) -> Service:
         parts.append(Block(f"{NAME}.bodies", plant.bodies, state, inputs, tuple(bodies), bodies[0].period))
     if plant.contact:
         parts.append(Block(f"{NAME}.contact", plant.contact, state, (InputPort(ports.TRUTH),), feet, feet[0].period))
-    return Service(NAME, parts, topic_encoders(setup, plant.wiring))
+    return Service(NAME, parts, topic_encoders(setup, plant.encoding))
 
 
 def _with_neighbours(
@@ -85,7 +85,7 @@ def _divergence_error(setup: RunConfig, plant: PlantSetup, state: Cell) -> Any:
         x, t = read(state), tick * setup.interval
         if plant.euler and (body := multirotor_euler.singular(x.vehicle.motion)) >= 0:
             return DivergedError(
-                f"the multirotor: {plant.wiring.bodies[body]}: pitch reached 90 degrees by t = {t:g} s, where "
+                f"the multirotor: {plant.encoding.bodies[body]}: pitch reached 90 degrees by t = {t:g} s, where "
                 'Euler angles are singular; use multibody.coordinates = "se3"'
             )
         system = "the multirotor" if isinstance(x, MultirotorPlantState) else plant.model

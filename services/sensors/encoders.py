@@ -41,7 +41,7 @@ UNKNOWN = -1.0  # first element of the covariance of a missing measurement
 PORTS = (ports.IMU, ports.MAGNETOMETER, ports.GPS, ports.BAROMETER, ports.SONAR)
 
 
-class SonarWiring(NamedTuple):
+class SonarEncoding(NamedTuple):
     """Constants of a sonar's messages."""
 
     field_of_view: float  # [rad]
@@ -49,14 +49,14 @@ class SonarWiring(NamedTuple):
     range_max: float  # [m]
 
 
-class GpsWiring(NamedTuple):
+class GpsEncoding(NamedTuple):
     """Constants of a satellite receiver's messages."""
 
     fix: int = NavSatStatus.STATUS_FIX  # NavSatStatus of its fixes
     detailed: bool = False  # kind of fix, satellites and dilution of precision are modelled
 
 
-def topic_encoders(setup: RunConfig, sonar: SonarWiring | None, gps: GpsWiring) -> list[TopicEncoder]:
+def topic_encoders(setup: RunConfig, sonar: SonarEncoding | None, gps: GpsEncoding) -> list[TopicEncoder]:
     """Return the encoders of the vehicle's sensors in `PORTS`."""
     frame, port_of = setup.vehicle, setup.ports
     known: list[tuple[Any, str, Callable, Any]] = [
@@ -183,7 +183,7 @@ def _gps_velocity(r: GpsReading, time_ns: np.ndarray) -> Fields:
     }
 
 
-def _sonar_sample(frame: str, sonar: SonarWiring | None) -> Any:
+def _sonar_sample(frame: str, sonar: SonarEncoding | None) -> Any:
     view, least, most = sonar or (0.0, 0.0, 0.0)
     return Range(header(0, frame), radiation_type=Range.ULTRASOUND, field_of_view=view, min_range=least, max_range=most)
 

@@ -11,7 +11,7 @@ from lapwing.kernels.cell import Cell
 from lapwing.services.common import ports
 from lapwing.services.common.encoders import reading_encoder
 from lapwing.services.sensors.block import Instrument
-from lapwing.services.sensors.encoders import PORTS, GpsWiring, SonarWiring, topic_encoders
+from lapwing.services.sensors.encoders import PORTS, GpsEncoding, SonarEncoding, topic_encoders
 
 NAME = "sensors"
 
@@ -20,8 +20,8 @@ class SensorsSetup(NamedTuple):
     """Resolved configuration of the service."""
 
     instruments: tuple[Instrument, ...]  # in the order of their ports
-    sonar: SonarWiring | None  # None without a sonar
-    gps: GpsWiring
+    sonar: SonarEncoding | None  # None without a sonar
+    gps: GpsEncoding
 
 
 def create(setup: RunConfig) -> Service:

@@ -69,10 +69,10 @@ def known(setup, services):
     if link := next((p for s in services for p in s.parts if hasattr(p, "reports")), None):  # foreign firmware
         link.status_texts.table += WORDS
         phases, words = phases or ("",), link.status_texts.table
-    wiring = values["plant"].wiring
+    encoding = values["plant"].encoding
     sensors = [instrument.sensor for instrument in values["sensors"].instruments] if "sensors" in values else []
     return SimpleNamespace(
-        vehicle=setup.vehicle, cells=wiring.cells, capacity=wiring.capacity, bodies=wiring.bodies,
+        vehicle=setup.vehicle, cells=encoding.cells, capacity=encoding.capacity, bodies=encoding.bodies,
         sonar=values["sensors"].sonar if "sensors" in values else None, phases=phases, words=words,
         rangefinder=next((sensor for sensor in sensors if isinstance(sensor, Rangefinder)), None),
     )  # fmt: skip
