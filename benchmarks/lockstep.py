@@ -28,12 +28,11 @@ from lapwing.cosim.transport.session_settings import mesh
 from lapwing.kernels.row_packing import pack_row
 from lapwing.services.common import ports
 from lapwing.services.common.ports import MotorCommand, Setpoint, TrueState
-from lapwing.services.plant.encoders import PlantWiring
-from lapwing.services.plant.encoders import wires as plant_wires
+from lapwing.services.plant.encoders import PlantEncoding, topic_encoders
 from lapwing.services.trajectory.resolve import LEAD
 
 HOPS = 3
-NONE = PlantWiring(5, False, 0, 0.0, ())
+NONE = PlantEncoding(5, False, 0, 0.0, ())
 PARTS = {  # inputs and ports of the mission's services
     "plant": (
         (InputPort(ports.ACTUATORS, 1),),
@@ -73,12 +72,12 @@ def lockstep_process(name, peers, cycles, core):
     services = {name: ServiceConfig(None, *parts) for name, parts in PARTS.items()}
     setup = RunConfig("benchmark", "", 1, cycles, 250, 4_000_000, "gauss_seidel", "drone1", services, {}, {})
     part = Constant(name, cycles)
-    wires = plant_wires(setup, NONE) if name == "plant" else []
+    encoders = topic_encoders(setup, NONE) if name == "plant" else []
     participants = PublisherIds("bench")
     with ZenohBus(*mesh(name, peers), gid=participants.gid(name)) as bus:
         run_lockstep(
             Participant(name, setup, bus, participants, list(peers), core=core),
-            Service(name, [part], wires),
+            Service(name, [part], encoders),
             name == "plant",
             "recorder",
         )

@@ -38,7 +38,7 @@ def share(terrain, vehicles=0):
     """Return the least share of a core over the repeats, with this number of other vehicles 5 m away."""
     bodies = (VisibleBody(0.0, 0.0, 0.5, -0.2, 0.1),) * vehicles
     instrument = Instrument(lidar.VLP16, (1, 2), 9.81, STANDARD._replace(terrain=terrain), bodies)
-    (encoder,) = lidar.wires("drone1", Port("lidar", lidar.READING, 25), instrument)
+    (encoder,) = lidar.topic_encoders("drone1", Port("lidar", lidar.READING, 25), instrument)
     record, ticks = Record.of(encoder.sample()), np.arange(SCANS)
     position = np.column_stack([0.1 * ticks, 0.0 * ticks, 2.0 + 0.0 * ticks])
     upright = np.tile([1.0, 0.0, 0.0, 0.0], (SCANS, 1))

@@ -139,14 +139,6 @@ def remove_on_failure(log: Path) -> Iterator[None]:
             raise
 
 
-def modification_time(path: Path) -> int | None:
-    """Return the time of the last write [ns], or None if there is no such file."""
-    try:
-        return path.stat().st_mtime_ns
-    except OSError:
-        return None
-
-
 def check_distinct(paths: dict[str, Path | None]) -> None:
     """Raise ValueError if two options name the same file."""
     names: dict[Path, str] = {}

@@ -17,12 +17,12 @@ from lapwing.cli.output_paths import (
     check_log,
     claim,
     claim_report,
-    modification_time,
     remove_on_failure,
     reserve_log,
 )
 from lapwing.cli.preflight import check_firmware_program, warn_of_gains, warn_of_round_off, with_solver_selected
 from lapwing.cli.run_options import MULTI_PROCESS, SINGLE_PROCESS, RunOptions
+from lapwing.cosim.output_lock import modification_time
 from lapwing.cosim.processes.child_process import Child, start_early
 
 if TYPE_CHECKING:

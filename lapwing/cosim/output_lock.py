@@ -22,6 +22,14 @@ def write_errors(path: str | Path) -> Iterator[None]:
         raise ValueError(f"{path}: cannot be written: {reason}") from None
 
 
+def modification_time(path: Path) -> int:
+    """Return the time of the last write [ns], or 0 if the file does not exist."""
+    try:
+        return path.stat().st_mtime_ns
+    except OSError:
+        return 0
+
+
 class OutputLock:
     """Lock of a file or folder until `close`, or until the process ends.
 

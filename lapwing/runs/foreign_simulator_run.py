@@ -93,6 +93,6 @@ def services(setup: RunConfig) -> list[Service]:
     own: SimulatorSetup = config.parameters
     client = SimulatorClient(own.host, own.port)
     receiver = Receiver(own, client, config.ports)
-    first = Service(f"{NAME}.receive", [receiver], encoders.wires(setup, None, encoders.GpsWiring()))
+    first = Service(f"{NAME}.receive", [receiver], encoders.topic_encoders(setup, None, encoders.GpsEncoding()))
     last = Service(f"{NAME}.send", [Sender(own, client, receiver)], [])
     return [first, *(create(setup, name) for name in setup.order if name != NAME), last]

@@ -24,10 +24,10 @@ def columns_of(
     """
     interval = graph.setup.interval_ns
     for service in graph.services:
-        for wire in service.wires:
-            if graph.tick and (wire.topic.recorded if only is None else template_topic(wire.topic) in only):
-                columns = PortColumns(graph, wire)
-                yield wire.topic, columns.ticks * interval, columns
+        for encoder in service.encoders:
+            if graph.tick and (encoder.topic.recorded if only is None else template_topic(encoder.topic) in only):
+                columns = PortColumns(graph, encoder)
+                yield encoder.topic, columns.ticks * interval, columns
         for topic in service.python_topics:
             messages = [(tick, payload) for of, tick, payload in service.messages if of is topic]
             if messages and (only is None or template_topic(topic) in only):
@@ -41,32 +41,32 @@ class PortColumns(Mapping[str, Any]):
     Encoding takes half as long as the simulation, and studies of many flights only need numbers of the samples.
     """
 
-    def __init__(self, graph: BlockDiagram, wire: TopicEncoder):
+    def __init__(self, graph: BlockDiagram, encoder: TopicEncoder):
         """Create from a topic of a finished block diagram with the full history of its port."""
-        self._graph, self._wire = graph, wire
-        self.ticks = due_ticks(0, graph.tick, wire.period)
-        self._rows = graph.history(wire.port, wire.period)
-        tree = columns(graph.ports[wire.port].like, self._rows)
-        self._fields = wire.fields(tree, self.ticks * graph.setup.interval_ns)
-        self._texts = () if wire.texts is None else wire.texts(tree)
+        self._graph, self._encoder = graph, encoder
+        self.ticks = due_ticks(0, graph.tick, encoder.period)
+        self._rows = graph.history(encoder.port, encoder.period)
+        tree = columns(graph.ports[encoder.port].like, self._rows)
+        self._fields = encoder.fields(tree, self.ticks * graph.setup.interval_ns)
+        self._texts = () if encoder.texts is None else encoder.texts(tree)
         first = tuple(int(column[0]) for column in self._texts)
-        self._shapes = _shapes(wire.topic.message, wire.sample(*first).encode())
+        self._shapes = _shapes(encoder.topic.message, encoder.sample(*first).encode())
         self._columns: dict[str, np.ndarray] = {}
 
     @cached_property
     def _names(self) -> dict[str, None]:
         """Names of the fields that all messages have, whatever their texts."""
         keys = _distinct(self._texts) if self._texts else [()]
-        shapes = [_shapes(self._wire.topic.message, self._wire.sample(*key).encode()) for key in keys]
+        shapes = [_shapes(self._encoder.topic.message, self._encoder.sample(*key).encode()) for key in keys]
         return dict.fromkeys(name for name in shapes[0] if all(name in others for others in shapes))
 
     @cached_property
     def messages(self) -> TopicColumns:
         """Encoded messages."""
-        port = self._graph.ports[self._wire.port]
-        pages = list(encode(self._wire, port, self._graph.setup, self.ticks, self._rows))
+        port = self._graph.ports[self._encoder.port]
+        pages = list(encode(self._encoder, port, self._graph.setup, self.ticks, self._rows))
         parts = [(np.searchsorted(self.ticks, page.ticks), page.payloads) for page in pages]
-        return history_of_pages(self._wire.topic.message, parts)
+        return history_of_pages(self._encoder.topic.message, parts)
 
     def payloads(self) -> list[bytes]:
         """Return the CDR of the messages in order."""

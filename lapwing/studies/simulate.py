@@ -77,9 +77,11 @@ def _fly(
     """Return (block diagram at the end, `only`, reason of an early end, True for a non-finite state)."""
     setup = run if isinstance(run, RunConfig) else resolve(run)
     services = create_all(setup, operator, recorded)
-    wires = [wire for service in services for wire in service.wires]
+    encoders = [encoder for service in services for encoder in service.encoders]
     selected = {
-        wire.port for wire in wires if (wire.topic.recorded if only is None else template_topic(wire.topic) in only)
+        encoder.port
+        for encoder in encoders
+        if (encoder.topic.recorded if only is None else template_topic(encoder.topic) in only)
     }
     if every_port:
         selected = {port.name for service in services for part in service.parts for port in part.outputs}

@@ -7,7 +7,7 @@ from datetime import datetime
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from lapwing.cosim.output_lock import is_locked
+from lapwing.cosim.output_lock import is_locked, modification_time
 from lapwing.flight import Flight
 from lapwing.studies.flight_data import SHOWN
 from lapwing.studies.metrics import unmet_criteria
@@ -57,7 +57,7 @@ class RecentFlights:
         """Return the file names of the logs, the newest first, without those that are being written."""
         paths = [path for path in self._folder.glob("*.mcap") if path.is_file()] if self._folder.is_dir() else []
         dated = [
-            (modified, path.name) for path in paths if (modified := _modification_time(path)) and not is_locked(path)
+            (modified, path.name) for path in paths if (modified := modification_time(path)) and not is_locked(path)
         ]
         return [name for _, name in sorted(dated, reverse=True)[:MOST]]
 
@@ -70,7 +70,7 @@ class RecentFlights:
     def summary(self, name: str) -> FlightSummary:
         """Return the summary of a log. Raise KeyError if the log does not exist."""
         path = self.path(name)
-        key = (name, _modification_time(path))
+        key = (name, modification_time(path))
         with self._lock:
             if key not in self._cache:
                 self._cache[key] = _summary(path)
@@ -90,7 +90,7 @@ class RecentFlights:
     def report(self, *names: str) -> Path:
         """Return the report of one log, or of an overlay of two. Raise KeyError or ValueError."""
         paths = [self.path(name) for name in names]
-        stamp = "_".join(str(_modification_time(path)) for path in paths)
+        stamp = "_".join(str(modification_time(path)) for path in paths)
         target = self._reports / f"{'_'.join(path.stem for path in paths)[:120]}_{stamp}.html"
         with self._lock:
             if not target.exists():
@@ -98,16 +98,8 @@ class RecentFlights:
         return target
 
 
-def _modification_time(path: Path) -> int:
-    """Return the time of the last write [ns], or 0 if the file does not exist."""
-    try:
-        return path.stat().st_mtime_ns
-    except OSError:
-        return 0
-
-
 def _summary(path: Path) -> FlightSummary:
-    recorded = datetime.fromtimestamp(_modification_time(path) * 1e-9).strftime("%Y-%m-%d %H:%M")
+    recorded = datetime.fromtimestamp(modification_time(path) * 1e-9).strftime("%Y-%m-%d %H:%M")
     try:
         flights = [flight for flight in Flight.read_all(path, SHOWN) if len(flight.truth)]
         if not flights:

@@ -10,14 +10,14 @@ from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
 from lapwing.messages import Estimate, EstimateCovariance, Reading, header
 from lapwing.messages import topics as topic
-from lapwing.messages.cdr_arrays import quaternion_columns, stamp_columns
+from lapwing.messages.cdr_arrays import stamp_columns
 from lapwing.services.autopilot.estimator import NAMES
 from lapwing.services.common import ports
-from lapwing.services.common.encoders import actuators_encoder, setpoint_encoder, status_encoder
+from lapwing.services.common.encoders import actuators_encoder, pose_columns, setpoint_encoder, status_encoder
 from lapwing.services.common.ports import StateEstimate
 
 
-def wires(
+def topic_encoders(
     setup: RunConfig, estimate_every: int, status_every: int, phases: Sequence[str], status_texts: Sequence[Any]
 ) -> list[TopicEncoder]:
     """Return the encoders of the autopilot's topics.
@@ -36,11 +36,11 @@ def wires(
         ),
         setpoint_encoder(topic.SETPOINT, ports.SETPOINT, phases),
         status_encoder(status_every, phases, status_texts),
-        *([_covariance_wire(setup.port(name))] if (name := ports.ESTIMATE_COVARIANCE) in setup.ports else []),
+        *([_covariance_encoder(setup.port(name))] if (name := ports.ESTIMATE_COVARIANCE) in setup.ports else []),
     ]
 
 
-def imu_selection_wire(vehicle: str, every: int) -> TopicEncoder:
+def imu_selection_encoder(vehicle: str, every: int) -> TopicEncoder:
     """Return the encoder of the vote between redundant IMUs: the unit in use and the bits of failed ones."""
 
     def fields(x: ports.ImuSelection, time_ns: np.ndarray) -> Fields:
@@ -52,7 +52,7 @@ def imu_selection_wire(vehicle: str, every: int) -> TopicEncoder:
     )
 
 
-def _covariance_wire(port: Port) -> TopicEncoder:
+def _covariance_encoder(port: Port) -> TopicEncoder:
     def fields(x: ports.EstimateCovariance, time_ns: np.ndarray) -> Fields:
         return {**stamp_columns(time_ns), "covariance": x.covariance, "nis": x.nis}
 
@@ -69,9 +69,7 @@ def _estimate_sample(rejected: int) -> Any:
 
 def _estimate(x: StateEstimate, time_ns: np.ndarray) -> Fields:
     return {
-        **stamp_columns(time_ns),
-        "pose.position": x.position_world,
-        "pose.orientation": quaternion_columns(x.attitude),
+        **pose_columns(x, time_ns),
         "velocity": x.velocity_world,
         "angular_velocity": x.omega_body,
         "acceleration_world": x.acceleration_world,

@@ -16,7 +16,7 @@ from lapwing.services.autopilot.commander.wakeup_conditions import battery_thres
 from lapwing.services.autopilot.commander_block import CommanderBlock, Operator, controller, flies_px4_cascade
 from lapwing.services.autopilot.commander_wakeup import WakeupParameters
 from lapwing.services.autopilot.custom.custom_blocks import controller_blocks, estimator_blocks
-from lapwing.services.autopilot.encoders import imu_selection_wire, wires
+from lapwing.services.autopilot.encoders import imu_selection_encoder, topic_encoders
 from lapwing.services.autopilot.estimator import Estimator
 from lapwing.services.autopilot.estimator.blocks.correction import Correction
 from lapwing.services.autopilot.estimator.blocks.covariance import CovarianceOutput
@@ -33,8 +33,8 @@ from lapwing.services.autopilot.px4 import law as px4_law
 from lapwing.services.autopilot.px4.block import Px4Controller
 from lapwing.services.autopilot.service_config import AutopilotSetup
 from lapwing.services.common import ports
-from lapwing.services.common.airspeed_encoder import airspeed_encoder
 from lapwing.services.common.autopilot_parameters import GPS_HEIGHT, SONAR_HEIGHT
+from lapwing.services.common.encoders import airspeed_encoder
 from lapwing.services.common.failure_types import SOUND, Faults, with_satellites
 from lapwing.services.common.ports import EstimateCovariance, StateEstimate
 
@@ -83,12 +83,12 @@ def create(setup: RunConfig, operator: Operator = lambda tick: ()) -> Service:
     navigation = _navigation(setup, config, wakeup, outputs[ports.ESTIMATE], injection)
     service.parts = [*injection.before(NAME), *navigation, commander, *control, *injection.after(NAME, actuators)]
     phases, status_texts = commander.phases.table, commander.status_texts.table
-    service.wires = wires(setup, config.estimate_every, config.status_every, phases, status_texts)
+    service.encoders = topic_encoders(setup, config.estimate_every, config.status_every, phases, status_texts)
     if ports.AIRSPEED in sensor_ports:
         airspeed_port = setup.port(ports.AIRSPEED)._replace(name=injection.received(ports.AIRSPEED))
-        service.wires.append(airspeed_encoder(topic.AIRSPEED_RECEIVED, setup.vehicle, airspeed_port))
+        service.encoders.append(airspeed_encoder(topic.AIRSPEED_RECEIVED, setup.vehicle, airspeed_port))
     if config.imus > 1:
-        service.wires.append(imu_selection_wire(setup.vehicle, config.imu_every))
+        service.encoders.append(imu_selection_encoder(setup.vehicle, config.imu_every))
     service.python_topics = (topic.OPERATOR, topic.COMMAND_ACKS) if config.operator else ()
     return service
 

@@ -1,4 +1,4 @@
-"""Topic encoders of motor commands, autopilot status and setpoints."""
+"""Topic encoders, and columns of messages, that several services have in common."""
 
 from collections.abc import Callable, Sequence
 from typing import Any
@@ -8,12 +8,52 @@ import numpy as np
 from lapwing import messages
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
-from lapwing.messages import Actuators, Status, Vector3, header
+from lapwing.kernels import math
+from lapwing.kernels.row_packing import row_width
+from lapwing.messages import Actuators, FluidPressure, Reading, Status, Vector3, header
 from lapwing.messages import topics as topic
-from lapwing.messages.cdr_arrays import stamp_columns
+from lapwing.messages.cdr_arrays import quaternion_columns, stamp_columns
 from lapwing.messages.topics import Topic
 from lapwing.services.common import ports
-from lapwing.services.common.ports import AutopilotStatus, MotorCommand, Setpoint
+from lapwing.services.common.ports import (
+    AirspeedReading,
+    AutopilotStatus,
+    BarometerReading,
+    MotorCommand,
+    Setpoint,
+    StateEstimate,
+    TrueState,
+)
+
+
+def pose_columns(x: TrueState | StateEstimate, time_ns: np.ndarray) -> Fields:
+    """Return time, and pose of the body in the world."""
+    pose = {"pose.position": x.position_world, "pose.orientation": quaternion_columns(x.attitude)}
+    return {**stamp_columns(time_ns), **pose}
+
+
+def pressure_columns(r: AirspeedReading | BarometerReading, time_ns: np.ndarray) -> Fields:
+    """Return time, pressure and variance; the pressure is NaN without a reading."""
+    pressure = np.where(np.asarray(r.valid) != 0.0, r.pressure, math.nan)
+    return {**stamp_columns(time_ns), "fluid_pressure": pressure, "variance": r.variance}
+
+
+def airspeed_encoder(topic: Topic, frame: str, port: Port) -> TopicEncoder:
+    """Return the encoder of the airspeed readings on `port`; `frame` is the vehicle's name."""
+    return TopicEncoder(topic, port.name, port.period, pressure_columns, lambda: FluidPressure(header(0, frame)))
+
+
+def reading_encoder(frame: str, port: Port) -> TopicEncoder:
+    """Return the encoder of a port without a message type of its own: all numbers of its value, in order."""
+    sample = Reading(header(0, frame), port.name, (0.0,) * row_width(port.like))
+    return TopicEncoder(topic.custom_sensor(port.name), port.name, port.period, _reading, lambda: sample)
+
+
+def _reading(value: Any, time_ns: np.ndarray) -> Fields:
+    def leaves(part: Any) -> list[np.ndarray]:
+        return [leaf for item in part for leaf in leaves(item)] if isinstance(part, tuple) else [part]
+
+    return {**stamp_columns(time_ns), "values": np.column_stack(leaves(value))}
 
 
 def setpoint_encoder(topic: Topic, port: str, texts: Sequence[str]) -> TopicEncoder:

@@ -5,6 +5,7 @@ from dataclasses import replace
 from typing import Any
 
 from lapwing.cosim.diagram.compiled_block import Block
+from lapwing.cosim.diagram.port_rows import RenamedPortRows
 from lapwing.cosim.diagram.tick_schedule import InputPort
 
 
@@ -41,23 +42,12 @@ class _PythonBlock:
         self._part.bind(_Diagram(graph, self._replaced))
 
 
-class _Diagram:
+class _Diagram(RenamedPortRows):
     """View of a block diagram, or of a vehicle's part, with ports of FMUs under the names of the replaced ports."""
 
     def __init__(self, graph: Any, replaced: Mapping[str, str]):
-        self._graph, self._replaced = graph, replaced
+        super().__init__(graph, lambda port: replaced.get(port, port))
+        self._graph = graph
 
     def __getattr__(self, name: str) -> Any:
         return getattr(self._graph, name)
-
-    def has(self, port: str) -> bool:
-        return bool(self._graph.has(self._replaced.get(port, port)))
-
-    def latest(self, port: str, tick: int) -> Any:
-        return self._graph.latest(self._replaced.get(port, port), tick)
-
-    def row(self, port: str, tick: int) -> Any:
-        return self._graph.row(self._replaced.get(port, port), tick)
-
-    def ring(self, port: str) -> Any:
-        return self._graph.ring(self._replaced.get(port, port))

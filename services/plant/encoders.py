@@ -28,13 +28,14 @@ from lapwing.messages import (
 from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import quaternion_columns, stamp_columns
 from lapwing.services.common import ports
+from lapwing.services.common.encoders import pose_columns
 from lapwing.services.common.ports import BatteryReading, BodyMotions, ContactForces, TrueState
 
 WORLD = "world"
 AMPERE_HOUR = 3600.0  # [A s]
 
 
-class PlantWiring(NamedTuple):
+class PlantEncoding(NamedTuple):
     """Contents of the plant's messages besides its state."""
 
     pose_every: int  # ticks between poses, transforms and clocks
@@ -44,21 +45,21 @@ class PlantWiring(NamedTuple):
     bodies: tuple[str, ...]  # names, in the order of the port
 
 
-def wires(setup: RunConfig, wiring: PlantWiring) -> list[TopicEncoder]:
+def topic_encoders(setup: RunConfig, encoding: PlantEncoding) -> list[TopicEncoder]:
     """Return the encoders of the plant's topics."""
-    truth, declared_ports, every = setup.port(ports.TRUTH), setup.ports, wiring.pose_every
+    truth, declared_ports, every = setup.port(ports.TRUTH), setup.ports, encoding.pose_every
     result = [
         TopicEncoder(topic.TRUTH, ports.TRUTH, 1, _truth, lambda: _truth_sample(truth.like)),
-        TopicEncoder(topic.POSE, ports.TRUTH, every, _pose, lambda: PoseStamped(header(0, WORLD))),
+        TopicEncoder(topic.POSE, ports.TRUTH, every, pose_columns, lambda: PoseStamped(header(0, WORLD))),
         TopicEncoder(topic.TF, ports.TRUTH, every, _transform, lambda: _transform_sample(setup.vehicle)),
         TopicEncoder(topic.CLOCK, ports.TRUTH, every, lambda _, time_ns: stamp_columns(time_ns, "clock"), Clock),
     ]
-    if wiring.odometry:
+    if encoding.odometry:
         odometry = Odometry(header(0, WORLD), setup.vehicle)
         result.append(TopicEncoder(topic.ODOM, ports.TRUTH, every, _odometry, lambda: odometry))
     optional = {
-        ports.BATTERY: (topic.BATTERY, _battery(wiring), lambda _: _battery_sample(setup.vehicle, wiring)),
-        ports.BODIES: (topic.BODIES, _bodies, lambda _: _bodies_sample(wiring.bodies)),
+        ports.BATTERY: (topic.BATTERY, _battery(encoding), lambda _: _battery_sample(setup.vehicle, encoding)),
+        ports.BODIES: (topic.BODIES, _bodies, lambda _: _bodies_sample(encoding.bodies)),
         ports.CONTACT: (topic.CONTACT, _contact, _contact_sample),
     }
     for name, (message_topic, fields, sample_of) in optional.items():
@@ -81,16 +82,10 @@ def _truth_sample(like: TrueState) -> Any:
     )
 
 
-def _pose(x: TrueState, time_ns: np.ndarray) -> Fields:
-    """Return the fields of the body's pose in the world."""
-    pose = {"pose.position": x.position_world, "pose.orientation": quaternion_columns(x.attitude)}
-    return {**stamp_columns(time_ns), **pose}
-
-
 def _truth(x: TrueState, time_ns: np.ndarray) -> Fields:
     """Return the fields of the true state."""
     return {
-        **_pose(x, time_ns),
+        **pose_columns(x, time_ns),
         "velocity": x.velocity_world,
         "angular_velocity": x.omega_body,
         "acceleration": x.acceleration_world,
@@ -130,21 +125,21 @@ def _transform(x: TrueState, time_ns: np.ndarray) -> Fields:
     }
 
 
-def _battery_sample(vehicle: str, wiring: PlantWiring) -> Any:
+def _battery_sample(vehicle: str, encoding: PlantEncoding) -> Any:
     return BatteryState(
         header(0, vehicle),
         temperature=math.nan,
         capacity=math.nan,
-        design_capacity=wiring.capacity / AMPERE_HOUR,
+        design_capacity=encoding.capacity / AMPERE_HOUR,
         power_supply_status=BatteryState.POWER_SUPPLY_STATUS_DISCHARGING,
         power_supply_technology=BatteryState.POWER_SUPPLY_TECHNOLOGY_LIPO,
         present=True,
-        cell_voltage=(0.0,) * wiring.cells,
+        cell_voltage=(0.0,) * encoding.cells,
     )
 
 
-def _battery(wiring: PlantWiring) -> Any:
-    capacity, cells = wiring.capacity / AMPERE_HOUR, wiring.cells
+def _battery(encoding: PlantEncoding) -> Any:
+    capacity, cells = encoding.capacity / AMPERE_HOUR, encoding.cells
 
     def fields(x: BatteryReading, time_ns: np.ndarray) -> Fields:
         """Return the fields of the battery; unmodelled ones are NaN, as in sensor_msgs."""

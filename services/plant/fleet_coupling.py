@@ -85,7 +85,7 @@ def _sling(config: ServiceConfig) -> Sling | None:
 def _without_bodies(config: ServiceConfig) -> ServiceConfig:
     """Return the plant without the load's output, which another vehicle has."""
     plant: PlantSetup = config.parameters
-    parameters = plant._replace(wiring=plant.wiring._replace(bodies=()))
+    parameters = plant._replace(encoding=plant.encoding._replace(bodies=()))
     return ServiceConfig(parameters, config.inputs, tuple(port for port in config.ports if port.name != ports.BODIES))
 
 

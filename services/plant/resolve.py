@@ -31,7 +31,7 @@ def resolve(scene: Scene) -> ServiceConfig:
                 "effects.shared_slung_load", f"the model {model} publishes its own bodies", "another model"
             )
         plant = result.parameters
-        parameters = plant._replace(wiring=plant.wiring._replace(bodies=("load",)))
+        parameters = plant._replace(encoding=plant.encoding._replace(bodies=("load",)))
         return ServiceConfig(parameters, result.inputs, (*result.ports, bodies_port(scene, 1)))
     return result
 

@@ -19,8 +19,8 @@ from lapwing.services.plant.blocks import system_outputs  # noqa: F401 (register
 from lapwing.services.plant.blocks.failing_multirotor import FailingMultirotorPlant
 from lapwing.services.plant.blocks.interaction import Interaction
 from lapwing.services.plant.blocks.multirotor import MultirotorPlantState
-from lapwing.services.plant.blocks.neighbour_state import PresenceView
-from lapwing.services.plant.encoders import wires
+from lapwing.services.plant.blocks.neighbour_state import NeighbourStateOutput
+from lapwing.services.plant.encoders import topic_encoders
 from lapwing.services.plant.fleet_coupling import LOAD, PRESENCE
 from lapwing.services.plant.service_config import FleetCoupling, PlantSetup
 
@@ -54,7 +54,7 @@ def create(setup: RunConfig) -> Service:
         parts.append(Block(f"{NAME}.bodies", plant.bodies, state, inputs, tuple(bodies), bodies[0].period))
     if plant.contact:
         parts.append(Block(f"{NAME}.contact", plant.contact, state, (InputPort(ports.TRUTH),), feet, feet[0].period))
-    return Service(NAME, parts, wires(setup, plant.wiring))
+    return Service(NAME, parts, topic_encoders(setup, plant.encoding))
 
 
 def _with_neighbours(
@@ -63,7 +63,7 @@ def _with_neighbours(
     """Return the plant's blocks between the effects of its neighbours and its own neighbour state."""
     vehicle, interval = plant.core.vehicle, plant.core.interval
     interaction = Interaction(vehicle.effects, interval)
-    view = PresenceView(vehicle, others.presence, interval)
+    view = NeighbourStateOutput(vehicle, others.presence, interval)
     result = [
         Block(f"{NAME}.interaction", interaction, state, _delayed_inputs(PRESENCE, *others.ports)),
         *parts,
@@ -85,7 +85,7 @@ def _divergence_error(setup: RunConfig, plant: PlantSetup, state: Cell) -> Any:
         x, t = read(state), tick * setup.interval
         if plant.euler and (body := multirotor_euler.singular(x.vehicle.motion)) >= 0:
             return DivergedError(
-                f"the multirotor: {plant.wiring.bodies[body]}: pitch reached 90 degrees by t = {t:g} s, where "
+                f"the multirotor: {plant.encoding.bodies[body]}: pitch reached 90 degrees by t = {t:g} s, where "
                 'Euler angles are singular; use multibody.coordinates = "se3"'
             )
         system = "the multirotor" if isinstance(x, MultirotorPlantState) else plant.model
@@ -104,7 +104,7 @@ class PropellerFailures:
         replacements: blocks to replace at later ticks, by tick.
     """
 
-    name = f"{NAME}.breakages"
+    name = f"{NAME}.failures"
     outputs = ()
 
     def __init__(self, plant: PlantSetup):

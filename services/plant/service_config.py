@@ -3,7 +3,7 @@
 from typing import Any, NamedTuple
 
 from lapwing.dynamics.effects._vehicle_interaction import NeighbourState
-from lapwing.services.plant.encoders import PlantWiring
+from lapwing.services.plant.encoders import PlantEncoding
 
 
 class PlantEvent(NamedTuple):
@@ -31,7 +31,7 @@ class PlantSetup(NamedTuple):
     model: str  # name of the plant model
     core: Any  # parameters of a block of services/plant/blocks
     start: Any  # state at tick 0
-    wiring: PlantWiring
+    encoding: PlantEncoding
     bodies: Any = None  # parameters of the block that publishes body states, or None
     events: tuple[PlantEvent, ...] = ()
     euler: bool = False  # five bodies in Euler angles, singular at a pitch of 90 degrees

@@ -11,7 +11,7 @@ from lapwing.dynamics.lie.quaternion import rotate_back
 from lapwing.dynamics.noise import TURN_ON, Key, normal, normal3
 from lapwing.kernels import always_inline, kernel
 from lapwing.messages import topics as topic
-from lapwing.services.common.airspeed_encoder import airspeed_encoder
+from lapwing.services.common.encoders import airspeed_encoder
 from lapwing.services.common.ports import AirspeedReading
 from lapwing.services.sensors import error_models
 from lapwing.services.sensors.delay_line import BLANK, DEPTH, Fault, Line, apply_delay_and_faults, new_delay_line
@@ -77,7 +77,7 @@ def sample(p: Airspeed, s: AirspeedState, key: Key, tick: int, truth: Truth) -> 
     return AirspeedState(s.scale, s.turn_on_bias, line), AirspeedReading(delayed[0], variance, valid)
 
 
-def wires(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
+def topic_encoders(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
     """Return the encoder of the sensor's topic."""
     return [airspeed_encoder(topic.AIRSPEED, frame, port)]
 

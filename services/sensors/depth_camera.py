@@ -17,7 +17,7 @@ from lapwing.messages.cdr_arrays import stamp_columns
 from lapwing.services.sensors.scan import READING, ScanPose, ScanState, blank, instrument_pose, scan_distances
 from lapwing.services.sensors.sensor_inputs import Place, Truth
 
-__all__ = ["PRESETS", "READING", "DepthCamera", "blank", "initial", "pixels", "sample", "wires"]
+__all__ = ["PRESETS", "READING", "DepthCamera", "blank", "initial", "pixels", "sample", "topic_encoders"]
 
 SEES_VEHICLES = True
 
@@ -64,7 +64,7 @@ def pixels(p: DepthCamera) -> tuple[np.ndarray, np.ndarray]:
     return np.array(result), np.array(along)
 
 
-def wires(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
+def topic_encoders(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
     """Return the encoder of the sensor's topic."""
     p: DepthCamera = instrument.sensor
     terrain = as_relief(instrument.around.terrain)

@@ -7,10 +7,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lapwing.cosim.config.run_config import RunConfig
-from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.diagram.topic_encoder import Fields, TopicEncoder
 from lapwing.kernels import math
-from lapwing.kernels.row_packing import row_width
 from lapwing.messages import (
     FluidPressure,
     GPSFix,
@@ -20,14 +18,14 @@ from lapwing.messages import (
     NavSatFix,
     NavSatStatus,
     Range,
-    Reading,
     TwistWithCovarianceStamped,
     header,
 )
 from lapwing.messages import topics as topic
 from lapwing.messages.cdr_arrays import stamp_columns
 from lapwing.services.common import ports
-from lapwing.services.common.ports import BarometerReading, DistanceReading, GpsReading, ImuReading, MagnetometerReading
+from lapwing.services.common.encoders import pressure_columns
+from lapwing.services.common.ports import DistanceReading, GpsReading, ImuReading, MagnetometerReading
 
 # by `GpsReading.fix`
 _NAV_SAT = np.array([0, *(getattr(NavSatStatus, f"STATUS_{name}FIX") for name in ("", "SBAS_", "GBAS_", "GBAS_"))])
@@ -43,7 +41,7 @@ UNKNOWN = -1.0  # first element of the covariance of a missing measurement
 PORTS = (ports.IMU, ports.MAGNETOMETER, ports.GPS, ports.BAROMETER, ports.SONAR)
 
 
-class SonarWiring(NamedTuple):
+class SonarEncoding(NamedTuple):
     """Constants of a sonar's messages."""
 
     field_of_view: float  # [rad]
@@ -51,14 +49,14 @@ class SonarWiring(NamedTuple):
     range_max: float  # [m]
 
 
-class GpsWiring(NamedTuple):
+class GpsEncoding(NamedTuple):
     """Constants of a satellite receiver's messages."""
 
     fix: int = NavSatStatus.STATUS_FIX  # NavSatStatus of its fixes
     detailed: bool = False  # kind of fix, satellites and dilution of precision are modelled
 
 
-def wires(setup: RunConfig, sonar: SonarWiring | None, gps: GpsWiring) -> list[TopicEncoder]:
+def topic_encoders(setup: RunConfig, sonar: SonarEncoding | None, gps: GpsEncoding) -> list[TopicEncoder]:
     """Return the encoders of the vehicle's sensors in `PORTS`."""
     frame, port_of = setup.vehicle, setup.ports
     known: list[tuple[Any, str, Callable, Any]] = [
@@ -67,7 +65,7 @@ def wires(setup: RunConfig, sonar: SonarWiring | None, gps: GpsWiring) -> list[T
         (topic.GPS, ports.GPS, partial(_gps, gps.fix), _gps_sample(frame)),
         (topic.GPS_VELOCITY, ports.GPS, _gps_velocity, TwistWithCovarianceStamped(header(0, "world"))),
         *([(topic.GPS_DETAILS, ports.GPS, _gps_details, _details_sample(frame))] if gps.detailed else []),
-        (topic.BARO, ports.BAROMETER, _barometer, FluidPressure(header(0, frame))),
+        (topic.BARO, ports.BAROMETER, pressure_columns, FluidPressure(header(0, frame))),
         (topic.SONAR, ports.SONAR, _sonar, _sonar_sample(frame, sonar)),
     ]
     return [
@@ -75,13 +73,6 @@ def wires(setup: RunConfig, sonar: SonarWiring | None, gps: GpsWiring) -> list[T
         for name, port, fields, sample in known
         if port in port_of
     ]
-
-
-def custom_sensor_encoder(frame: str, port: Port) -> TopicEncoder:
-    """Return the encoder of a custom sensor."""
-    return TopicEncoder(
-        topic.custom_sensor(port.name), port.name, port.period, _custom, partial(_custom_sample, frame, port)
-    )
 
 
 def diagonal(values: np.ndarray, size: int = 3) -> np.ndarray:
@@ -94,19 +85,6 @@ def diagonal(values: np.ndarray, size: int = 3) -> np.ndarray:
 
 def _three(values: np.ndarray) -> np.ndarray:
     return np.repeat(np.asarray(values)[:, None], 3, axis=1)
-
-
-def _custom_sample(frame: str, port: Port) -> Any:
-    return Reading(header(0, frame), port.name, (0.0,) * row_width(port.like))
-
-
-def _custom(reading: Any, time_ns: np.ndarray) -> Fields:
-    """Return the numbers of a custom sensor's reading."""
-
-    def leaves(part: Any) -> list[np.ndarray]:
-        return [leaf for item in part for leaf in leaves(item)] if isinstance(part, tuple) else [part]
-
-    return {**stamp_columns(time_ns), "values": np.column_stack(leaves(reading))}
 
 
 def _imu(r: ImuReading, time_ns: np.ndarray) -> Fields:
@@ -205,16 +183,7 @@ def _gps_velocity(r: GpsReading, time_ns: np.ndarray) -> Fields:
     }
 
 
-def _barometer(r: BarometerReading, time_ns: np.ndarray) -> Fields:
-    """Return the absolute pressure; NaN without a reading."""
-    return {
-        **stamp_columns(time_ns),
-        "fluid_pressure": np.where(np.asarray(r.valid) != 0.0, r.pressure, math.nan),
-        "variance": r.variance,
-    }
-
-
-def _sonar_sample(frame: str, sonar: SonarWiring | None) -> Any:
+def _sonar_sample(frame: str, sonar: SonarEncoding | None) -> Any:
     view, least, most = sonar or (0.0, 0.0, 0.0)
     return Range(header(0, frame), radiation_type=Range.ULTRASOUND, field_of_view=view, min_range=least, max_range=most)
 

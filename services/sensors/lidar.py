@@ -18,7 +18,7 @@ from lapwing.messages.cdr_arrays import stamp_columns
 from lapwing.services.sensors.scan import READING, ScanPose, ScanState, blank, instrument_pose, scan_distances
 from lapwing.services.sensors.sensor_inputs import Place, Truth
 
-__all__ = ["PRESETS", "READING", "Lidar", "blank", "check", "initial", "rays", "sample", "wires"]
+__all__ = ["PRESETS", "READING", "Lidar", "blank", "check", "initial", "rays", "sample", "topic_encoders"]
 
 MOST_RAYS = 200_000  # of one scan
 SEES_VEHICLES = True
@@ -80,7 +80,7 @@ def rays(p: Lidar) -> np.ndarray:
     return np.array(result)
 
 
-def wires(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
+def topic_encoders(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
     """Return the encoder of the sensor's topic."""
     p: Lidar = instrument.sensor
     terrain, directions = as_relief(instrument.around.terrain), rays(p)

@@ -104,7 +104,7 @@ def _fields(r: OpticalFlowReading, time_ns: np.ndarray) -> Fields:
     }
 
 
-def wires(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
+def topic_encoders(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
     """Return the encoder of the sensor's topic."""
     return [
         TopicEncoder(topic.OPTICAL_FLOW, port.name, port.period, _fields, lambda: OpticalFlowMessage(header(0, frame)))

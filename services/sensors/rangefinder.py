@@ -23,7 +23,7 @@ from lapwing.services.sensors.delay_line import DEPTH, Fault
 from lapwing.services.sensors.distance import CHANNELS, FARTHEST, DistanceState, blank, initial_state, measure
 from lapwing.services.sensors.sensor_inputs import OtherVehicle, Place, Truth
 
-__all__ = ["CHANNELS", "PRESETS", "READING", "Rangefinder", "blank", "initial", "sample", "to_ground", "wires"]
+__all__ = ["CHANNELS", "PRESETS", "READING", "Rangefinder", "blank", "initial", "sample", "to_ground", "topic_encoders"]
 
 SEES_VEHICLES = True
 
@@ -103,7 +103,7 @@ def _fields(r: DistanceReading, time_ns: np.ndarray) -> Fields:
     return {**stamp_columns(time_ns), "range": distance, "variance": r.variance}
 
 
-def wires(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
+def topic_encoders(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
     """Return the encoder of the sensor's topic."""
     p: Rangefinder = instrument.sensor
 

@@ -24,7 +24,7 @@ from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle, VehicleAirframe, airframe, gravity
 from lapwing.services.sensors.block import Instrument
-from lapwing.services.sensors.encoders import GpsWiring, SonarWiring
+from lapwing.services.sensors.encoders import GpsEncoding, SonarEncoding
 from lapwing.services.sensors.gps import Gps
 from lapwing.services.sensors.imu import Imu
 from lapwing.services.sensors.registry import module_of, parameters
@@ -49,20 +49,20 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     if not tables:
         return None
     instruments, outputs = [], []
-    sonar, gps = None, GpsWiring()
+    sonar, gps = None, GpsEncoding()
     for name, table in sorted(tables.items()):
         p = parameters(name, table, scene[Communication].interval)
         if name == ports.IMU:
             p = _with_damage(scene, p)
         elif name == ports.GPS:
             p = _with_terrain(scene, p)
-            gps = GpsWiring(p.fix_status, p.constellation is not None or p.rtk is not None)
+            gps = GpsEncoding(p.fix_status, p.constellation is not None or p.rtk is not None)
         key = stream_key(scene[Run].seed, scene[Vehicle].name, name)
         instruments.append(Instrument(p, key, gravity(scene), environment(scene)))
         reading = READINGS[name] if name in READINGS else _reading(name, table, p)
         outputs.append(Port(name, reading, ticks(scene, p.rate, f"sensors.{name}.rate")))
         if name == ports.SONAR:
-            sonar = SonarWiring(math.radians(2.0 * p.half_beam_deg), p.range_min, p.range_max)
+            sonar = SonarEncoding(math.radians(2.0 * p.half_beam_deg), p.range_min, p.range_max)
         for unit in ports.IMUS[1 : p.instances] if name == ports.IMU else ():
             if unit in tables:
                 raise ConfigError(f"sensors.{unit}", "is the name of a redundant unit of sensors.imu", "another name")

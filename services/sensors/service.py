@@ -9,8 +9,9 @@ from lapwing.cosim.diagram.compiled_block import Block
 from lapwing.cosim.diagram.topic_encoder import TopicEncoder
 from lapwing.kernels.cell import Cell
 from lapwing.services.common import ports
+from lapwing.services.common.encoders import reading_encoder
 from lapwing.services.sensors.block import Instrument
-from lapwing.services.sensors.encoders import PORTS, GpsWiring, SonarWiring, custom_sensor_encoder, wires
+from lapwing.services.sensors.encoders import PORTS, GpsEncoding, SonarEncoding, topic_encoders
 
 NAME = "sensors"
 
@@ -19,8 +20,8 @@ class SensorsSetup(NamedTuple):
     """Resolved configuration of the service."""
 
     instruments: tuple[Instrument, ...]  # in the order of their ports
-    sonar: SonarWiring | None  # None without a sonar
-    gps: GpsWiring
+    sonar: SonarEncoding | None  # None without a sonar
+    gps: GpsEncoding
 
 
 def create(setup: RunConfig) -> Service:
@@ -31,7 +32,7 @@ def create(setup: RunConfig) -> Service:
         Block(f"{NAME}.{port.name}", p, Cell(_blank(p)), config.inputs[: 1 + len(p.others)], (port,), port.period)
         for p, port in zip(s.instruments, config.ports, strict=True)
     ]
-    return Service(NAME, parts, _module_encoders(setup, s) + wires(setup, s.sonar, s.gps))
+    return Service(NAME, parts, _module_encoders(setup, s) + topic_encoders(setup, s.sonar, s.gps))
 
 
 def _module_encoders(setup: RunConfig, s: SensorsSetup) -> list[TopicEncoder]:
@@ -42,7 +43,7 @@ def _module_encoders(setup: RunConfig, s: SensorsSetup) -> list[TopicEncoder]:
         if port.name in PORTS:
             continue
         built_in = module.__package__ == __package__ and port.name not in ports.IMUS
-        result += module.wires(setup.vehicle, port, p) if built_in else [custom_sensor_encoder(setup.vehicle, port)]
+        result += module.topic_encoders(setup.vehicle, port, p) if built_in else [reading_encoder(setup.vehicle, port)]
     return result
 
 

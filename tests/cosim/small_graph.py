@@ -13,6 +13,6 @@ def setup_of(ports=(), last=10_000):
     )
 
 
-def graph_of(*parts, ports=(), wires=(), page=8):
+def graph_of(*parts, ports=(), encoders=(), page=8):
     """Return the diagram of these blocks; `ports` are their ports of other services."""
-    return BlockDiagram(setup_of(ports), [Service(NAME, list(parts), list(wires))], page)
+    return BlockDiagram(setup_of(ports), [Service(NAME, list(parts), list(encoders))], page)

@@ -14,10 +14,10 @@ from lapwing.services.process_table import create
 
 def digest_of_rows(setup: RunConfig, rows: np.ndarray) -> str:
     """Return the digest of one row for each tick, as the recorder computes it."""
-    wire = next(w for w in create(setup, "plant").wires if w.topic.name == TRUTH.name)
+    encoder = next(w for w in create(setup, "plant").encoders if w.topic.name == TRUTH.name)
     ticks = np.arange(len(rows))
     digest = Digest()
-    for page in encode(wire, setup.port(wire.port), setup, ticks, rows):
+    for page in encode(encoder, setup.port(encoder.port), setup, ticks, rows):
         payloads = np.ascontiguousarray(page.payloads).view(np.uint8).reshape(len(ticks), -1)
         digest.update_page(TRUTH.name, page.ticks * setup.interval_ns, payloads)
     return digest.hexdigest()

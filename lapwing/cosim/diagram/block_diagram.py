@@ -36,14 +36,14 @@ class Service:
 
     name: str
     parts: Sequence[Any]
-    wires: Sequence[TopicEncoder]
+    encoders: Sequence[TopicEncoder]
     messages: list[tuple[Topic, int, bytes]] = field(default_factory=list)  # (topic, tick, payload) not yet fetched
     python_topics: Sequence[Topic] = ()  # the topics of `messages`
 
     @property
     def topics(self) -> list[Topic]:
         """All topics that it publishes."""
-        return [*(wire.topic for wire in self.wires), *self.python_topics]
+        return [*(encoder.topic for encoder in self.encoders), *self.python_topics]
 
 
 class ExternalBlock:
@@ -204,10 +204,12 @@ class BlockDiagram(PortRows):
         topics = None if only is None else set(only)
         result: list[RecordBatch] = []
         for service in self.services:
-            for wire in service.wires:
-                ticks = due_ticks(first, stop, wire.period)
-                if len(ticks) and (wire.topic.recorded if topics is None else wire.topic in topics):
-                    result += encode(wire, self.ports[wire.port], self.setup, ticks, self.rows(wire.port, ticks))
+            for encoder in service.encoders:
+                ticks = due_ticks(first, stop, encoder.period)
+                if len(ticks) and (encoder.topic.recorded if topics is None else encoder.topic in topics):
+                    result += encode(
+                        encoder, self.ports[encoder.port], self.setup, ticks, self.rows(encoder.port, ticks)
+                    )
             python_messages = [
                 m for m in service.messages if first <= m[1] < stop and (topics is None or m[0] in topics)
             ]

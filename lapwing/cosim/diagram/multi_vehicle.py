@@ -9,11 +9,10 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-import numpy as np
-
 from lapwing.cosim.config.run_config import PerVehicle, RunConfig, ServiceConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram, Service
 from lapwing.cosim.diagram.compiled_block import Block, BoundBlock
+from lapwing.cosim.diagram.port_rows import RenamedPortRows
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.messages.topics import CLOCK, Topic, of_vehicle
 
@@ -90,19 +89,19 @@ def primary_topic(setup: RunConfig, topic: Topic) -> Topic:
 def merge_services(name: str, services: Sequence[tuple[RunConfig, Service]]) -> Service:
     """Return a service with the blocks of all vehicles; `services` has the configuration and service of each."""
     fleet = Service(name, [], [])
-    parts, wires, python_topics = [], [], []
+    parts, encoders, python_topics = [], [], []
     clocks = 0
     for member, service in services:
         vehicle = member.vehicle
         parts += [_part(member, part) for part in service.parts]
-        for wire in service.wires:
-            clocks += wire.topic is CLOCK
-            if wire.topic is not CLOCK or clocks == 1:  # the clocks of all vehicles are equal
-                topic, port = of_vehicle(wire.topic, vehicle), qualified_name(vehicle, wire.port)
-                wires.append(replace(wire, topic=topic, port=port))
+        for encoder in service.encoders:
+            clocks += encoder.topic is CLOCK
+            if encoder.topic is not CLOCK or clocks == 1:  # the clocks of all vehicles are equal
+                topic, port = of_vehicle(encoder.topic, vehicle), qualified_name(vehicle, encoder.port)
+                encoders.append(replace(encoder, topic=topic, port=port))
         service.messages = _Outbox(fleet, vehicle)
         python_topics += [of_vehicle(topic, vehicle) for topic in service.python_topics]
-    fleet.parts, fleet.wires, fleet.python_topics = parts, wires, python_topics
+    fleet.parts, fleet.encoders, fleet.python_topics = parts, encoders, python_topics
     return fleet
 
 
@@ -186,10 +185,11 @@ class ConnectedVehicleBlock(VehicleBlock):
         return {f"{self.vehicle}/{key}": text for key, text in self._part.reports.items()}
 
 
-class VehicleDiagram:
+class VehicleDiagram(RenamedPortRows):
     """View of a fleet's block diagram for one vehicle, with the names of a run of that vehicle alone."""
 
     def __init__(self, graph: BlockDiagram, member: RunConfig):
+        super().__init__(graph, partial(qualified_name, member.vehicle))
         self._graph, self.setup = graph, member
 
     def part(self, name: str) -> Block:
@@ -203,32 +203,3 @@ class VehicleDiagram:
     def replace(self, part: Block, code: BoundBlock) -> None:
         """Replace the block of the same name by a prepared one."""
         self._graph.replace(part, code)
-
-    def has(self, port: str) -> bool:
-        """Return True if a block of the fleet reads or writes the port."""
-        return self._graph.has(qualified_name(self.setup.vehicle, port))
-
-    def latest(self, port: str, tick: int) -> Any:
-        """Return the value of a port at the last tick up to `tick` at which one was due."""
-        return self._graph.latest(qualified_name(self.setup.vehicle, port), tick)
-
-    @property
-    def ports(self) -> dict[str, Port]:
-        """Ports of the vehicle by name without the vehicle's prefix."""
-        return self.setup.ports
-
-    def row(self, port: str, tick: int) -> np.ndarray:
-        """Return the numbers of a port at `tick`."""
-        return self._graph.row(qualified_name(self.setup.vehicle, port), tick)
-
-    def ring(self, port: str) -> np.ndarray:
-        """Return the ring buffer of a port."""
-        return self._graph.ring(qualified_name(self.setup.vehicle, port))
-
-    def put_row(self, port: str, tick: int, row: np.ndarray) -> None:
-        """Set the numbers of a port at `tick`."""
-        self._graph.put_row(qualified_name(self.setup.vehicle, port), tick, row)
-
-    def put(self, port: str, tick: int, value: Any) -> None:
-        """Set the value of a port at `tick`."""
-        self._graph.put(qualified_name(self.setup.vehicle, port), tick, value)

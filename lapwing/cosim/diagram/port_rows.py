@@ -1,13 +1,14 @@
 """Rows of the ports of a block diagram: ring buffers that are read and written by tick."""
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
 from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
 from lapwing.kernels.row_packing import pack_row, row_unpacker, row_width
 
+T = TypeVar("T")
 SPARE = 8  # rows of a port in addition to those of a tick block
 
 
@@ -77,6 +78,30 @@ class PortRows:
     def _index(self, port: str, ticks: Any) -> Any:
         period = self.ports[port].period
         return 0 if period == LATCHED else (ticks // period) & (len(self._rows[port]) - 1)
+
+
+class RenamedPortRows(PortRows):
+    """View of the rows of ports under other names."""
+
+    def __init__(self, rows: PortRows, name_of: Callable[[str], str]):
+        """Create a view of `rows`; `name_of` returns the name there of a port of the view."""
+        self.ports, self._rows = _RenamedItems(rows.ports, name_of), _RenamedItems(rows._rows, name_of)
+        self._readers = {}
+
+
+class _RenamedItems(dict[str, T]):
+    """Items of a dict under other names, which are translated at their first use."""
+
+    def __init__(self, items: dict[str, T], name_of: Callable[[str], str]):
+        super().__init__()
+        self._items, self._name_of = items, name_of
+
+    def __contains__(self, name: object) -> bool:
+        return isinstance(name, str) and self._name_of(name) in self._items
+
+    def __missing__(self, name: str) -> T:
+        item = self[name] = self._items[self._name_of(name)]
+        return item
 
 
 def _ring(port: Port, ticks: int, delay: int, former: np.ndarray | None) -> np.ndarray:

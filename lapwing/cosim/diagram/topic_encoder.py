@@ -50,23 +50,23 @@ class RecordBatch(NamedTuple):
 
 
 def encode(
-    wire: TopicEncoder, port: Port, setup: RunConfig, ticks: np.ndarray, rows: np.ndarray
+    encoder: TopicEncoder, port: Port, setup: RunConfig, ticks: np.ndarray, rows: np.ndarray
 ) -> Iterator[RecordBatch]:
     """Yield the messages of a topic at `ticks` (n,), from the rows (n, width) of its port at these ticks."""
     tree = columns(port.like, rows)
-    if wire.texts is None:
-        yield _record_batch(wire, wire.sample(), tree, ticks, setup)
+    if encoder.texts is None:
+        yield _record_batch(encoder, encoder.sample(), tree, ticks, setup)
         return
-    keys = np.stack([np.asarray(column, np.int64) for column in wire.texts(tree)], axis=1)
+    keys = np.stack([np.asarray(column, np.int64) for column in encoder.texts(tree)], axis=1)
     for key in np.unique(keys, axis=0):
         selected = np.flatnonzero((keys == key).all(axis=1))
         part = columns(port.like, rows[selected]) if len(selected) < len(ticks) else tree
-        yield _record_batch(wire, wire.sample(*key.tolist()), part, ticks[selected], setup)
+        yield _record_batch(encoder, encoder.sample(*key.tolist()), part, ticks[selected], setup)
 
 
-def _record_batch(wire: TopicEncoder, sample: Any, tree: Any, ticks: np.ndarray, setup: RunConfig) -> RecordBatch:
-    fields = wire.fields(tree, ticks * setup.interval_ns)
-    return RecordBatch(wire.topic, ticks, Record.of(sample).encode(len(ticks), fields))
+def _record_batch(encoder: TopicEncoder, sample: Any, tree: Any, ticks: np.ndarray, setup: RunConfig) -> RecordBatch:
+    fields = encoder.fields(tree, ticks * setup.interval_ns)
+    return RecordBatch(encoder.topic, ticks, Record.of(sample).encode(len(ticks), fields))
 
 
 def due_ticks(first: int, stop: int, period: int) -> np.ndarray:

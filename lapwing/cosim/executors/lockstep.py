@@ -128,7 +128,7 @@ def run_encoder(process: Participant, service: Service) -> None:
         LockStepError: a step packet is missing or out of order.
     """
     ports = process.setup.services[service.name].ports
-    external = Service(service.name, [ExternalBlock(service.name, *ports)], service.wires)
+    external = Service(service.name, [ExternalBlock(service.name, *ports)], service.encoders)
     graph = BlockDiagram(process.setup, [external], 2 * PAGE)
     receiver = PacketReceiver(process, service.name, [(port.name, port.period, 0) for port in ports], graph)
     sender = PacketSender(process, external, graph, publishes_steps=False)

@@ -151,7 +151,14 @@ class Scene:
         return known in self._known(known)._tables
 
     def replaced(self, section: SceneTable) -> "Scene":
-        """Return the scene with another version of a table, which is not checked against the other tables."""
+        """Return the scene with another version of a table, which is not checked against the other tables.
+
+        Raises:
+            SceneError: each of several vehicles has its own; see `with_vehicles`.
+        """
+        if self.vehicles and not section.SHARED:
+            message = f"each of the {len(self.vehicles)} vehicles has its own"
+            raise SceneError(section.TABLE, message, "the table of a scene with one vehicle", KeyOrigin(self.path))
         tables = {**self._tables, type(section): section}
         vehicles = [vehicle.replaced(section) for vehicle in self.vehicles]
         scene = Scene(self.path, tables, self._vocabulary, self.sources, locate=self._locate, vehicles=vehicles)

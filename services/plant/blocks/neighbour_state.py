@@ -14,7 +14,7 @@ from lapwing.dynamics.vehicles.newton_euler import angular_acceleration
 from lapwing.kernels import always_inline
 
 
-class PresenceView(NamedTuple):
+class NeighbourStateOutput(NamedTuple):
     """Parameters of the block."""
 
     vehicle: MultirotorParameters
@@ -32,7 +32,9 @@ def _inverse_inertia_world(body: Any, R: Mat3) -> Mat3:
 
 
 @always_inline
-def step(p: PresenceView, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[NeighbourState], int]:
+def step(
+    p: NeighbourStateOutput, s: Any, tick: int, inputs: tuple[InputSample, ...]
+) -> tuple[Any, tuple[NeighbourState], int]:
     """Output the neighbour state at `tick` from the true state."""
     truth, vehicle = inputs[0].value, p.vehicle
     body = hooks.all_mass_properties(vehicle.effects, s.vehicle.memory, vehicle.body)

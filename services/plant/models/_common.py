@@ -23,7 +23,7 @@ from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle, airframe, gravity, start_pose
 from lapwing.services.plant.blocks.multirotor import MultirotorPlant, MultirotorPlantState
 from lapwing.services.plant.blocks.uncontrolled import AutonomousPlant
-from lapwing.services.plant.encoders import PlantWiring
+from lapwing.services.plant.encoders import PlantEncoding
 from lapwing.services.plant.schema import Solver, method
 from lapwing.services.plant.service_config import PlantSetup
 
@@ -40,10 +40,10 @@ def rate_ticks(scene: Scene, key: str) -> int:
 
 def message_contents(
     scene: Scene, odometry: bool = False, battery: Any = None, bodies: tuple[str, ...] = ()
-) -> PlantWiring:
+) -> PlantEncoding:
     """Return the contents of the plant's messages besides its state."""
     cells, capacity = (battery.cells, battery.capacity) if battery else (0, math.nan)
-    return PlantWiring(rate_ticks(scene, "pose"), odometry, cells, capacity, bodies)
+    return PlantEncoding(rate_ticks(scene, "pose"), odometry, cells, capacity, bodies)
 
 
 def bodies_port(scene: Scene, n: int) -> Port:

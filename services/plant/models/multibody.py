@@ -110,6 +110,6 @@ def resolve(scene: Scene) -> ServiceConfig:
         bodies=view,
         events=events,
         euler=form is multirotor_euler,
-        wiring=plant.wiring._replace(bodies=NAMES),
+        encoding=plant.encoding._replace(bodies=NAMES),
     )
     return result._replace(parameters=parameters, ports=(*result.ports, bodies_port(scene, len(NAMES))))

@@ -91,6 +91,6 @@ def resolve(scene: Scene) -> ServiceConfig:
     result = multirotor_plant(scene, *describe(scene))
     plant = result.parameters
     parameters = plant._replace(
-        model=NAME, bodies=SlungLoadView(plant.core.vehicle.layout), wiring=plant.wiring._replace(bodies=("load",))
+        model=NAME, bodies=SlungLoadView(plant.core.vehicle.layout), encoding=plant.encoding._replace(bodies=("load",))
     )
     return result._replace(parameters=parameters, ports=(*result.ports, bodies_port(scene, 1)))

@@ -102,7 +102,7 @@ def test_port_without_producer_is_named():
         graph_of(part)
 
 
-def wire(topic=SETPOINT, period=1):
+def encoder(topic=SETPOINT, period=1):
     """Return an encoder whose phase text depends on `good` of the readings."""
     texts = ("climb", "on the way")
     return TopicEncoder(
@@ -124,7 +124,7 @@ def messages(pages):
 
 def test_record_batches_are_equal_for_any_length():
     def flown(stops):
-        graph = graph_of(readings(end=50), wires=[wire(), wire(COMMAND_ACKS, 4)], page=64)
+        graph = graph_of(readings(end=50), encoders=[encoder(), encoder(COMMAND_ACKS, 4)], page=64)
         pages = []
         for stop in stops:
             first = graph.tick
@@ -143,7 +143,7 @@ def test_record_batches_are_equal_for_any_length():
 
 
 def test_unrecorded_topics_need_explicit_request():
-    graph = graph_of(readings(), wires=[wire(), wire(TRAJECTORY)], page=16)
+    graph = graph_of(readings(), encoders=[encoder(), encoder(TRAJECTORY)], page=16)
     graph.advance(4)
     assert [page.topic for page in graph.record_batches(2, 4)] == [SETPOINT]
     assert {page.topic for page in graph.record_batches(0, 4, [TRAJECTORY])} == {TRAJECTORY}

@@ -69,10 +69,10 @@ def known(setup, services):
     if link := next((p for s in services for p in s.parts if hasattr(p, "reports")), None):  # foreign firmware
         link.status_texts.table += WORDS
         phases, words = phases or ("",), link.status_texts.table
-    wiring = values["plant"].wiring
+    encoding = values["plant"].encoding
     sensors = [instrument.sensor for instrument in values["sensors"].instruments] if "sensors" in values else []
     return SimpleNamespace(
-        vehicle=setup.vehicle, cells=wiring.cells, capacity=wiring.capacity, bodies=wiring.bodies,
+        vehicle=setup.vehicle, cells=encoding.cells, capacity=encoding.capacity, bodies=encoding.bodies,
         sonar=values["sensors"].sonar if "sensors" in values else None, phases=phases, words=words,
         rangefinder=next((sensor for sensor in sensors if isinstance(sensor, Rangefinder)), None),
     )  # fmt: skip
@@ -95,20 +95,20 @@ def test_columnar_encoding_equals_scalar_encoding(path):
 def check_every_topic(setup, random):
     services = create_all(setup)
     inputs = known(setup, services)
-    for wire in (wire for service in services for wire in service.wires):
-        ticks = due_ticks(FIRST, FIRST + COUNT * wire.period, wire.period)
-        port = setup.port(wire.port)
+    for encoder in (encoder for service in services for encoder in service.encoders):
+        ticks = due_ticks(FIRST, FIRST + COUNT * encoder.period, encoder.period)
+        port = setup.port(encoder.port)
         trajectory = setup.services.get("trajectory")
-        texts = trajectory.parameters.phases if wire.port == "trajectory" else inputs.phases
+        texts = trajectory.parameters.phases if encoder.port == "trajectory" else inputs.phases
         values = [fitting(random_value(port.like, random), texts, random) for _ in ticks]
         rows = np.array([pack_row(value) for value in values])
-        pages = list(encode(wire, port, setup, ticks, rows))
+        pages = list(encode(encoder, port, setup, ticks, rows))
         result = {int(t): p.tobytes() for page in pages for t, p in zip(page.ticks, page.payloads, strict=True)}
         assert sum(len(page.ticks) for page in pages) == len(result) == len(ticks)
         for tick, value in zip(ticks, values, strict=True):
             assert row_unpacker(port.like)(pack_row(value)) == value
-            expected = BUILDERS[wire.topic](inputs, int(tick) * setup.interval_ns, value)
-            assert result[tick] == expected.encode(), wire.topic.name
+            expected = BUILDERS[encoder.topic](inputs, int(tick) * setup.interval_ns, value)
+            assert result[tick] == expected.encode(), encoder.topic.name
 
 
 def test_contact_forces_equal_scalar_encoding():
@@ -143,14 +143,14 @@ class Named(NamedTuple):
 def test_batch_is_split_by_text_in_order_of_ticks():
     texts = ["climb", "on the way", "climb again"]
     setup = SimpleNamespace(interval_ns=4_000_000)
-    wire = TopicEncoder(
+    encoder = TopicEncoder(
         SETPOINT, "it", 1,
         lambda x, time_ns: {**stamp_columns(time_ns), "yaw": x.number},
         lambda text: Setpoint(header(0, "world"), phase=texts[text]),
         lambda x: [x.text],
     )  # fmt: skip
     rows = np.array([(0.5, 1), (1.5, 0), (2.5, 1), (3.5, 2), (4.5, 0)])
-    pages = list(encode(wire, Port("it", Named(0.0, 0)), setup, np.arange(7, 12), rows))
+    pages = list(encode(encoder, Port("it", Named(0.0, 0)), setup, np.arange(7, 12), rows))
     result = [
         (int(tick), Setpoint.decode(payload.tobytes()))
         for page in pages

@@ -132,7 +132,7 @@ def test_waiting_service_does_not_hide_stalled_service(watch):
     assert result == "plant: no answer for 2.5 s, at t = 0.000 s"
 
 
-def test_starved_service_that_waited_is_no_stall_of_router():
+def test_starved_service_is_not_reported_as_router_stall():
     bus = SimpleNamespace(receive=lambda senders: None, watch_liveliness=lambda key, seen: None)
     names = ["plant", "sensors", "router"]
     watch = RunMonitor(bus, PublisherIds("test"), names, services=names[:2])

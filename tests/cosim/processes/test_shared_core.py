@@ -42,7 +42,7 @@ def masks(pid):
 
 
 @two_cores
-def test_thread_and_program_share_one_core_until_end(program):
+def test_program_shares_core_with_thread_until_end(program):
     allowed = os.sched_getaffinity(0)
 
     def share():
@@ -61,7 +61,7 @@ def test_thread_and_program_share_one_core_until_end(program):
 
 
 @two_cores
-def test_thread_with_one_core_leaves_program_alone(program):
+def test_thread_with_single_core_does_not_pin_program(program):
     last = max(os.sched_getaffinity(0))
 
     def share():
@@ -78,7 +78,7 @@ def test_thread_with_one_core_leaves_program_alone(program):
 
 
 @two_cores
-def test_thread_that_was_pinned_later_takes_its_program_along(program):
+def test_program_follows_thread_pinned_later(program):
     last = max(os.sched_getaffinity(0))
 
     def share():
@@ -157,7 +157,7 @@ def test_claims_differ_until_every_core_is_claimed():
         claim.release()
 
 
-def test_only_cores_of_the_mask_are_claimed(monkeypatch):
+def test_only_cores_in_affinity_mask_are_claimed(monkeypatch):
     mask = {NOBODY + 20, NOBODY + 25}
     monkeypatch.setattr(shared_core, "_affinity", lambda thread: mask)
     claims = [shared_core.claim_any() for _ in range(2)]
@@ -196,7 +196,7 @@ input()
         (0.2, {0: 1.0}, None),  # no other core
     ],
 )
-def test_core_is_left_for_a_clearly_less_loaded_one(own, loads, expected):
+def test_thread_moves_only_to_clearly_less_loaded_core(own, loads, expected):
     assert less_loaded_core(0, own, loads) == expected
 
 

@@ -154,7 +154,7 @@ def test_late_messages_after_pause_of_launcher_are_no_stall(run):
         run.update_for(1.0)
 
 
-def test_exit_without_end_of_others_is_named(run):
+def test_early_exit_of_service_is_reported_as_unexpected(run):
     run.start().exit("sensors")
     run.update()
     assert run.state is RunState.ENDING
@@ -198,7 +198,7 @@ def test_busy_optional_process_is_killed_after_a_minute(monkeypatch, measure):
     assert run.state is RunState.ENDING
 
 
-def test_time_that_launcher_waits_for_processor_is_no_stall(monkeypatch):
+def test_starved_launcher_reports_no_stall(monkeypatch):
     run = Run(monkeypatch)
     own = os.getpid()
     monkeypatch.setattr(

@@ -13,7 +13,7 @@ from lapwing.cosim.scene import Scene, SceneError
 from lapwing.cosim.scene.files import parse_toml
 from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.common.autopilot_parameters import table
-from lapwing.services.common.communication_schema import Communication
+from lapwing.services.common.communication_schema import Communication, Rates
 from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle, airframe, gravity, start_height
 from lapwing.services.scene_resolver import from_resolved, load, vocabulary
@@ -234,3 +234,11 @@ def test_replaced_table_keeps_other_cached_results():
     renamed = retitled.replaced(scene[Vehicle].model_copy(update={"name": "scout"}))
     assert renamed.cached(title) == "scout of another"
     assert requested[3:] == ["title", "name"]
+
+
+def test_replaced_rejects_table_that_each_vehicle_has():
+    fleet = load("fleet")
+    with pytest.raises(SceneError, match=r"vehicle: each of the \d vehicles has its own"):
+        fleet.replaced(fleet.vehicles[0][Vehicle])
+    rates = fleet[Rates].model_copy(update={"estimate": 125})
+    assert [scene[Rates].estimate for scene in fleet.replaced(rates).each_vehicle] == [125] * len(fleet.vehicles)

@@ -142,7 +142,7 @@ def test_roll_and_pitch_are_kept_before_lift_and_lift_before_yaw(collective, rol
         assert not possible(result._replace(yaw=result.yaw + 1e-3 * np.sign(yaw - result.yaw)))
 
 
-def test_failed_motor_stays_in_allocation_if_failure_mode_is_ignore():
+def test_failed_motor_stays_allocated_in_failure_mode_ignore():
     whole, failed = ((1.0, 1.0, 1.0, 1.0),), ((0.0, 0.0, 0.0, 0.0),)
     assert tables_for_failures((whole, failed), {}) == (whole, failed)
     assert tables_for_failures((whole, failed), {"CA_FAILURE_MODE": 1.0}) == (whole, failed)

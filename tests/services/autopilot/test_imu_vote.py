@@ -116,7 +116,7 @@ def varying_reading(k):
     return 1e-3 * np.sin(float(k))
 
 
-def test_deviating_unit_is_replaced_at_once_and_fails_after_ten_readings():
+def test_deviating_imu_fails_after_ten_readings():
     rows = [
         [reading(varying_reading(k) + 0.2), reading(varying_reading(k + 1)), reading(varying_reading(k + 2))]
         for k in range(20)

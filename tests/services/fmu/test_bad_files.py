@@ -81,14 +81,16 @@ def assert_rejected(folder: Path, message: str) -> None:
         (with_file("resources\\a", lambda _: b"x"), "is outside the FMU"),
     ],
 )
-def test_hostile_file_is_one_line(tmp_path: Path, files: Files, change: Callable[[Files], Files], message: str) -> None:
+def test_hostile_fmu_is_rejected_in_one_line(
+    tmp_path: Path, files: Files, change: Callable[[Files], Files], message: str
+) -> None:
     with zipfile.ZipFile(tmp_path / "bad.fmu", "w") as archive:
         for name, content in change(files).items():
             archive.writestr(name, content)
     assert_rejected(tmp_path, message)
 
 
-def test_archive_of_huge_size_is_one_line(tmp_path: Path, files: Files) -> None:
+def test_fmu_that_unpacks_beyond_limit_is_rejected_in_one_line(tmp_path: Path, files: Files) -> None:
     """The directory of the archive lists 4 files of 1.5 GB, of which it has no data."""
     path = tmp_path / "bad.fmu"
     with zipfile.ZipFile(path, "w") as archive:
@@ -106,7 +108,7 @@ def test_large_file_is_not_read(tmp_path: Path) -> None:
     assert_rejected(tmp_path, "has 5 GB; expected at most 4 GB")
 
 
-def test_damaged_member_is_one_line(tmp_path: Path, files: Files) -> None:
+def test_damaged_fmu_member_is_rejected_in_one_line(tmp_path: Path, files: Files) -> None:
     path = tmp_path / "bad.fmu"
     table = "resources/table.csv"  # no part that is read before the FMU is extracted
     with zipfile.ZipFile(path, "w") as archive:

@@ -216,7 +216,7 @@ def test_exported_plant_has_named_inputs(folder: Path) -> None:
         ('"effect" = "supply"', "unknown port 'effect'"),
     ],
 )
-def test_invalid_effect_input_is_one_line(folder: Path, outputs: str, message: str) -> None:
+def test_invalid_effect_input_is_rejected_in_one_line(folder: Path, outputs: str, message: str) -> None:
     done = run_command("run", str(scene_with(folder, outputs)), "--allow-code", "--log", str(folder / "x.mcap"))
     assert done.returncode == 2
     assert done.stderr.startswith("lapwing: ")

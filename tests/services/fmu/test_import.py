@@ -206,7 +206,7 @@ def test_fmu_without_allow_code_is_rejected(folder: Path) -> None:
         ),
     ],
 )
-def test_invalid_import_is_one_line(folder: Path, changes: dict, message: str) -> None:
+def test_invalid_fmu_table_is_rejected_in_one_line(folder: Path, changes: dict, message: str) -> None:
     done = fly(scene_with(folder, **changes), folder / "invalid.mcap")
     assert done.returncode in (1, 2)
     assert message in done.stderr
@@ -378,7 +378,7 @@ def test_option_of_other_interface_is_rejected(folder: Path, line: str, message:
         ('"u[0]" = "battery.charge"', "no effect of the scene models battery.charge; expected another column, or an"),
     ],
 )
-def test_connection_that_does_not_fit_is_rejected(tmp_path: Path, line: str, message: str) -> None:
+def test_incompatible_connection_is_rejected(tmp_path: Path, line: str, message: str) -> None:
     write_event_fmu(tmp_path / "ball.fmu")
     scene = scene_with(tmp_path, "ball.fmu", line, '"trajectory.position_world.2" = "h"')
     with pytest.raises(ValueError, match=r"services\.motor") as error:

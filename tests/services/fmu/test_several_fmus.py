@@ -90,7 +90,7 @@ def test_fmu_reads_port_of_lapwing_or_of_other_fmu(folder: Path, source: str, ga
     assert np.array_equal(2.0 * voltage[:, 0], gain * height[:, 2])
 
 
-def test_loop_through_own_blocks_is_one_line(folder: Path) -> None:
+def test_algebraic_loop_through_fmu_is_rejected_in_one_line(folder: Path) -> None:
     scene = scene_with(folder, filter_input=MOTOR)
     done = run_command("run", str(scene), "--log", str(folder / "loop.mcap"), *OPTIONS)
     assert done.returncode == 2

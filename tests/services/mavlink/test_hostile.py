@@ -244,7 +244,7 @@ def test_number_of_endpoints_is_limited():
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_first_command_after_garbage_in_a_stream_is_answered(seed):
+def test_first_command_after_garbage_is_answered(seed):
     """Without resynchronisation a marker in the garbage swallows up to 280 bytes of the commands behind it."""
     counts, codec = Counter(), mavlink.MAVLink(None, 255, 190)
     channel = Channel((1, 1), None, False, counts, strict=True)
@@ -260,7 +260,7 @@ def test_first_command_after_garbage_in_a_stream_is_answered(seed):
     assert counts["not MAVLink"]
 
 
-def test_frames_behind_a_false_marker_in_the_same_piece_are_read():
+def test_frames_after_false_marker_are_read():
     codec = mavlink.MAVLink(None, 255, 190)
     channel = Channel((1, 1), None, False, Counter())
     frame = mavlink.MAVLink_heartbeat_message(6, 8, 0, 0, 0, 3).pack(codec)

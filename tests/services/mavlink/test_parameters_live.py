@@ -121,7 +121,7 @@ def test_address_and_type_of_vehicle_are_set(station):
     assert (message.get_srcSystem(), message.param_value) == (42, 4.0)
 
 
-def test_arming_without_sensor_that_vehicle_need_not_have(station):
+def test_arming_does_not_require_optional_sensor(station):
     arm = mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0
     ready = mavlink.MAV_SYS_STATUS_PREARM_CHECK
     station.receive("SYS_STATUS", lambda m: m.onboard_control_sensors_health & ready)
@@ -135,7 +135,7 @@ def test_arming_without_sensor_that_vehicle_need_not_have(station):
 
 
 @pytest.mark.parametrize("station", [["--set", "autopilot.parameters.SYS_HAS_GPS=0"]], indirect=True)
-def test_autopilot_that_has_no_gps(station):
+def test_autopilot_without_gps_rejects_arming(station):
     gps = mavlink.MAV_SYS_STATUS_SENSOR_GPS
     station.receive("SYS_STATUS", lambda m: not m.onboard_control_sensors_health & gps)
     assert station.set("SYS_HAS_GPS", 1) == 1  # at the next start

@@ -133,7 +133,7 @@ def test_motors_and_their_outputs():
     assert m.actuator[4] == 0.0
 
 
-def test_stopped_motors_have_the_pulse_of_px4():
+def test_stopped_motors_get_px4_pulse_width():
     bench, station = followed()
     running = bench.vehicle.more
     for armed, failed, voltages, pulses in (

@@ -213,7 +213,7 @@ def test_acknowledgement_is_repeated_for_repeated_item():
         ({"command": 5001, "params": (2.0, 0.0, 0.0, 0.0)}, mavlink.MAV_MISSION_INVALID_PARAM1),
     ],
 )
-def test_item_that_cannot_be_flown_leaves_old_mission(changed, result):
+def test_unsupported_item_keeps_old_mission(changed, result):
     bench = Bench()
     client = bench.station()
     for up, more in ((7.0, {}), (9.0, changed)):
@@ -239,7 +239,7 @@ def test_camera_items_keep_their_index_without_effect():
     assert [m.text for m in client.all("STATUSTEXT")] == ["item 1: IMAGE_START_CAPTURE skipped"]
 
 
-def test_everything_is_cleared_with_one_acknowledgement():
+def test_clear_all_sends_single_acknowledgement():
     bench = Bench()
     client = bench.station()
     client.send("mission_clear_all", 1, 1, mavlink.MAV_MISSION_TYPE_ALL)

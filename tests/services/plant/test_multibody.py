@@ -51,7 +51,7 @@ BROKEN = f"multibody.event=[{event(0.1, 1, 'locked')}, {event(0.1, 2, 'free')}, 
 
 
 @pytest.mark.parametrize("coordinates", ["se3", "euler"])
-def test_propellers_break_in_flight(coordinates):
+def test_propeller_failures_in_flight(coordinates):
     """At 0.1 s the first locks and the second is freed, at 0.15 s the third is torn off; the fourth keeps running."""
     flight = [FLOWN, BROKEN, *CALM, f"multibody.coordinates={coordinates}"]
     just_before, _ = lift_off(flight, ticks=25)

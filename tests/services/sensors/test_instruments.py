@@ -274,7 +274,7 @@ def test_barometer_height_rises_by_static_pressure_error():
     assert height == pytest.approx(0.753 * 0.5 * 81.0 / 9.80665, rel=0.03)  # density and gravity of the place
 
 
-def test_pressure_error_set_for_one_direction_keeps_defaults_of_others():
+def test_pressure_error_of_single_direction_keeps_other_defaults():
     p = parameters("barometer", {"static_pressure_error": {"vertical": 0.1}}, 0.004)
     assert p.static_pressure_error == barometer.StaticPressureError(vertical=0.1)
     assert parameters("barometer", {}, 0.004).static_pressure_error is None

@@ -81,7 +81,7 @@ def test_directions_are_those_of_rotated_orbits(time):
     np.testing.assert_allclose(mine, look_angles(GALILEO, time), atol=1e-9)
 
 
-def test_constellation_repeats_after_stated_17_revolutions_in_10_days():
+def test_constellation_repeats_after_10_days():
     """Galileo's ground track repeats after 17 revolutions in 10 sidereal days, within the drift of its real orbits."""
     day = 2.0 * math.pi / satellites.EARTH_RATE
     first = np.array([satellites.direction(GALILEO, HOME, k, 0.0) for k in range(24)])

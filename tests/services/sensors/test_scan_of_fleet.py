@@ -95,7 +95,7 @@ def poses(log, vehicle, times):
     return truth.position[rows], Rotation.from_quat(truth.orientation[rows])
 
 
-def test_only_sensors_that_see_have_inputs_of_others(scene_file):
+def test_only_ranging_sensors_read_other_vehicles(scene_file):
     setup = resolve(load(scene_file))
     inputs = [i.port for i in setup.services["sensors"].inputs]
     assert inputs == ["seeing/truth", "seen/truth", "ahead/truth"]

@@ -65,7 +65,7 @@ def fly(faults: dict[str, str], extra: Sequence[str] = (), *, ignore_age: bool =
         gps = next(part for service in services for part in service.parts if isinstance(part.parameters, GpsFusion))
         gps.parameters = gps.parameters._replace(age=0)
     topics = (TRUTH, ESTIMATE)
-    selected = {wire.port for service in services for wire in service.wires if wire.topic in topics}
+    selected = {encoder.port for service in services for encoder in service.encoders if encoder.topic in topics}
     graph = BlockDiagram(setup, services, 64, selected)
     filtering: Any = next(part for service in services for part in service.parts if part.name.endswith("inertial"))
     min_eigenvalue = 1.0
