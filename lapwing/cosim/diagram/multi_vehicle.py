@@ -165,12 +165,12 @@ class VehicleBlock:
         return self._part.on_tick(tick)
 
     def failure(self, tick: int) -> Exception:
-        """Return the error of `tick` of a block that has compiled code."""
+        """Return the error of the block's compiled code at `tick`."""
         return _failure(self.vehicle, self._part.failure, tick)
 
 
 class ConnectedVehicleBlock(VehicleBlock):
-    """A Python block of a vehicle with a connection to a program outside the run."""
+    """Python block of a vehicle with a connection to a program outside the run."""
 
     def open(self, report_wait: Callable[[str], None]) -> None:
         """Connect."""
@@ -218,15 +218,15 @@ class VehicleDiagram:
         return self.setup.ports
 
     def row(self, port: str, tick: int) -> np.ndarray:
-        """Return the numbers of a port at `tick`."""
+        """Return the row of a port at `tick`, shape (width,)."""
         return self._graph.row(qualified_name(self.setup.vehicle, port), tick)
 
     def ring(self, port: str) -> np.ndarray:
-        """Return the ring buffer of a port."""
+        """Return the ring buffer of a port, shape (2^k, width)."""
         return self._graph.ring(qualified_name(self.setup.vehicle, port))
 
     def put_row(self, port: str, tick: int, row: np.ndarray) -> None:
-        """Set the numbers of a port at `tick`."""
+        """Set the row of a port at `tick`, shape (width,)."""
         self._graph.put_row(qualified_name(self.setup.vehicle, port), tick, row)
 
     def put(self, port: str, tick: int, value: Any) -> None:

@@ -25,8 +25,7 @@ def run_lockstep(process: Participant, service: Service, owns_time: bool, record
         owns_time: True if this process sets the pace and decides which tick is the last.
         recorder: the participant for whose log the clock owner waits.
 
-    The end travels with the step packets: an empty one is the last. The clock owner publishes in addition
-    whether that was the end of the run.
+    An empty step packet is the last one of a service. The clock owner also publishes whether the run was completed.
 
     Raises:
         Stopped: this process was requested to end.
@@ -160,10 +159,10 @@ def pin(core: int) -> None:
 
 
 def batch() -> None:
-    """Put this process into the scheduler's batch class, unless it has a special class.
+    """Put this process into the scheduler's batch class (SCHED_BATCH), unless its class is not the default.
 
-    A thread that it wakes then runs when it waits, instead of interrupting it. On a core that all services share, that
-    saves a third of the thread switches (docs/reference/benchmarks.md).
+    A thread that this process wakes then runs when this process waits, instead of interrupting it. On a core that all
+    services share, that saves a third of the thread switches (docs/reference/benchmarks.md).
     """
     if hasattr(os, "SCHED_BATCH") and os.sched_getscheduler(0) == os.SCHED_OTHER:
         for thread in os.listdir("/proc/self/task"):

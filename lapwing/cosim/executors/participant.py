@@ -87,7 +87,7 @@ class Participant(StopRequest):
     def packs_ticks(self) -> bool:
         """True if a service that runs ahead sends several ticks in a packet (see `packet_schedule`).
 
-        External services and services on several hosts take one tick at a time.
+        External services and services on several hosts exchange one tick at a time.
         """
         return not (self.participants.external or self.compares)
 
