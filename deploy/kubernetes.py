@@ -150,7 +150,11 @@ def main() -> None:
     parser.add_argument("scene", help="name of a shipped scene")
     parser.add_argument("--image", default="lapwing:latest")
     options = parser.parse_args()
-    print(json.dumps({"apiVersion": "v1", "kind": "List", "items": manifests(options.scene, options.image)}, indent=2))
+    try:
+        items = manifests(options.scene, options.image)
+    except ValueError as error:
+        parser.exit(2, f"kubernetes.py: {error}\n")
+    print(json.dumps({"apiVersion": "v1", "kind": "List", "items": items}, indent=2))
 
 
 if __name__ == "__main__":

@@ -27,10 +27,10 @@ class ProcessSpec(NamedTuple):
     name: str
     setup: RunConfig
     peers: dict[str, str]  # endpoint of every participant
-    key_prefix: str  # key prefix
+    key_prefix: str  # first part of all Zenoh keys of the run
     secret: str = ""  # secret of a run on one machine (lapwing.cosim.access.publisher_ids)
     speed: float | None = None  # simulated seconds per second; None for as fast as possible
-    core: int | None = None  # processor core shared by the services of a sequential lock step
+    core: int | None = None  # processor core shared by the services with Gauss-Seidel coupling
     log: str = ""  # path of the recorder's log
     sources: dict[str, str] | None = None  # texts of the scene's files by name, for the log
     mode: str = "multi-process"  # mode of the run, for the log

@@ -25,7 +25,7 @@ def user_errors() -> Iterator[None]:
     except (ValueError, BusError) as error:
         fail(str(error), USER_ERROR)
     except (RunFailed, LockStepError) as error:
-        fail(str(error), 1, error.__cause__)
+        fail(str(error), 1, _cause(error))
     except OutputError as error:
         if error.closed:  # end like a program that receives SIGPIPE
             raise SystemExit(128 + signal.SIGPIPE) from None
@@ -41,6 +41,15 @@ def user_errors() -> Iterator[None]:
         fail("system: not enough memory", 1)
     finally:
         release_claims()
+
+
+def _cause(error: BaseException) -> BaseException | None:
+    """Return the exception that caused `error`, None if there is none."""
+    cause = error.__cause__
+    # A pool of workers adds its own traceback as the cause, with the text of the causes before it.
+    if type(cause).__name__ == "_RemoteTraceback" and "the direct cause of" not in str(cause):
+        return None
+    return cause
 
 
 def fail(message: str, code: int, cause: BaseException | None = None) -> None:

@@ -12,7 +12,7 @@ from pathlib import Path
 
 @contextmanager
 def write_errors(path: str | Path) -> Iterator[None]:
-    """Turn an OSError into a ValueError that names the path."""
+    """Raise ValueError that names the path for an OSError within the context."""
     try:
         yield
     except OSError as error:

@@ -123,8 +123,9 @@ def _check(part: Any) -> None:
         return
     inner = getattr(part, "_part", part)
     module = type(inner).__module__
-    is_connected = hasattr(inner, "reports")  # connected to a firmware or another program
-    if is_connected or any(port.period != LATCHED for port in part.outputs) or not module.startswith("lapwing."):
+    if hasattr(inner, "reports"):  # a firmware
+        raise ValueError(f"{part.name}: connected to a program outside Lapwing; only compiled blocks can be exported")
+    if any(port.period != LATCHED for port in part.outputs) or not module.startswith("lapwing."):
         raise ValueError(f"{part.name}: runs Python code of the scene; only compiled blocks can be exported")
 
 

@@ -104,5 +104,5 @@ class Clock:
 
 
 def core_of_services(setup: RunConfig) -> CoreClaim | None:
-    """Claim a core for all services of a sequential lock step, which work one at a time; None for any core."""
+    """Claim a core for all services with Gauss-Seidel coupling, which work one at a time; None for any core."""
     return claim_any() if setup.coupling == "gauss_seidel" else None

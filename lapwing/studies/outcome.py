@@ -176,7 +176,8 @@ def _unfinished_outcome(status: TopicView, failsafe: tuple[float, str] | None) -
     if not ("armed" in status.fields and status.armed.any()):
         return "mission not finished, motors never armed"
     mode = " ".join(filter(None, (str(status.mode[-1]), f"({status.phase[-1]})" if status.phase[-1] else "")))
-    return f"mission not finished, in {mode}{_failsafe_text(failsafe)}"
+    where = f", in {mode}" if mode else ""  # a firmware may not have reported its mode
+    return f"mission not finished{where}{_failsafe_text(failsafe)}"
 
 
 def _failsafe_text(failsafe: tuple[float, str] | None) -> str:

@@ -30,7 +30,7 @@ def fly(
     rows: dict[str, np.ndarray] | None = None,
     observe: Callable[[int], None] | None = None,
 ) -> F:
-    """Simulate a run to its end, or until a state is non-finite, which gives the outcome "diverged".
+    """Simulate a run to its end, or until it fails; a non-finite state gives the outcome "diverged".
 
     Args:
         run: run configuration or scene.
@@ -39,6 +39,9 @@ def fly(
         kind: class of the result, a subclass of `FlightData`.
         rows: buffers of the topics, reused and overwritten by the next flight of a series.
         observe: called with the current tick after the compilation, and then every LOOK ticks.
+
+    Raises:
+        LockStepError: the run failed before its first tick, for example because a firmware did not start.
     """
     return kind.of(*_fly(run, only, operator, rows, observe))
 
@@ -93,6 +96,8 @@ def _fly(
                 observe(graph.tick)
             graph.advance(min(graph.tick + look, setup.last_tick + 1))
     except LockStepError as error:
+        if graph.tick == 0 and not isinstance(error, DivergedError):  # a firmware did not start: there is no flight
+            raise
         failure, diverged = str(error), isinstance(error, DivergedError)
     finally:
         graph.close()

@@ -44,7 +44,12 @@ BOUNCE = 1.0  # [s] of possible motion after a touch-down
 
 
 def create(setup: RunConfig, operator: Operator = lambda tick: ()) -> Service:
-    """Return the autopilot of a run; `operator` is a source of commands in addition to the plan."""
+    """Return the autopilot of a run.
+
+    Args:
+        setup: run configuration.
+        operator: returns the commands received until a tick, in addition to those of the plan.
+    """
     config: AutopilotSetup = setup.services[NAME].parameters
     outputs = {port.name: port for port in setup.services[NAME].ports}
     values = {p.name: p.default for p in config.parameters}

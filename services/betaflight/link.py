@@ -94,7 +94,7 @@ class BetaflightLink(ProgramLink):
     def open(self, waits: Waits) -> None:
         """Start the firmware or wait for it, and calibrate it."""
         setup = self._setup
-        advice = "stop the other simulator that uses it"
+        advice = "stop the other run or simulator that uses it; a campaign needs --workers 1"
         self._socket = bound_socket(NAME, setup.host, self._ports.motors, advice)
         self._program = boot.start(setup, waits)
         self._calibrate(waits)

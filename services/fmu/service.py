@@ -1,4 +1,4 @@
-"""FMU as a service of the lock step."""
+"""Service of the lock step that steps an FMU in a process of its own."""
 
 from typing import Any
 
@@ -22,10 +22,10 @@ def create(setup: RunConfig, name: str) -> Service:
 
     Args:
         setup: run configuration.
-        name: name of the service.
+        name: name of the service, such as "motor_fmu" for `[services.motor]`.
 
     Raises:
-        ValueError: foreign code is not allowed.
+        ValueError: foreign code is not allowed (`--allow-code`).
     """
     foreign_code.check(setup)
     fmu: FmuConfig = setup.services[name].parameters

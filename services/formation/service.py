@@ -1,4 +1,4 @@
-"""The formation control service and its topic encoder."""
+"""Formation control service: thrust [N] and moment [N m] of each vehicle that carries the load."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Live display of a run: it reads the services' log packets, which does not slow the services."""
+"""Foxglove server of a run: it reads the services' log packets, and no service waits for it."""
 
 from typing import Any
 
@@ -11,7 +11,11 @@ from lapwing.services.foxglove.server import Server
 
 
 def run(process: Participant, spec: Any) -> None:
-    """Serve until the run has ended or this process is requested to stop.
+    """Serve the topics and events of a run until it has ended or this process is requested to stop.
+
+    Args:
+        process: this process as a participant of the run.
+        spec: its `ProcessSpec`.
 
     Raises:
         ValueError: the server cannot listen at the address.

@@ -1,8 +1,8 @@
 """MAVLink process of a run: telemetry to ground stations, and their commands to the autopilot.
 
 It is not part of the lock step: no service waits for it, and the flight continues when it dies. In a run with a
-real-time factor, a subscription to the estimate wakes it; it reads all other topics from the services' log packets,
-ten per second, which wait for the next estimate.
+real-time factor, each estimate wakes it. It reads all other topics from the services' log packets, ten
+per second, which stay in the queue until the next estimate.
 """
 
 import time
@@ -32,6 +32,10 @@ ALL = (OPERATOR, STATUS, COMMAND_ACKS, ESTIMATE)  # topics of which all messages
 
 def run(process: Participant, spec: Any) -> None:
     """Serve the links until the run has ended or this process is requested to stop; then print a report.
+
+    Args:
+        process: this process as a participant of the run.
+        spec: its `ProcessSpec`.
 
     Raises:
         ValueError: a link cannot be opened.

@@ -97,7 +97,7 @@ def _divergence_error(setup: RunConfig, plant: PlantSetup, state: Cell) -> Any:
 
 
 class PropellerFailures:
-    """Replaces the plant when a propeller is locked, freed or torn off in flight; the state continues.
+    """Python block that replaces the plant when a propeller is locked, freed or torn off; the state continues.
 
     Attributes:
         events: first ticks whose outputs a failure affects.

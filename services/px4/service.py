@@ -1,4 +1,4 @@
-"""The service of PX4's adapter."""
+"""Service of the lock step that exchanges samples with PX4."""
 
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import Service
@@ -10,5 +10,10 @@ NAME = "px4"
 
 
 def create(setup: RunConfig, recorded: Recorded | None = None) -> Service:
-    """Return the adapter of a run; `recorded` replaces the firmware by the commands of a log."""
+    """Return the service that lets PX4 fly a run.
+
+    Args:
+        setup: run configuration.
+        recorded: messages of a log by topic and tick, which replace the firmware; None to connect to the firmware.
+    """
     return firmware_service(setup, NAME, Px4Link, recorded)

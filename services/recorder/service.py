@@ -22,7 +22,17 @@ REPORTED_WAIT = 1.0  # [s] of waiting for the disk above which the log's metadat
 
 
 def run(process: Participant, spec: Any) -> None:
-    """Record until all services have ended or this process is requested to stop; the log is readable in both cases."""
+    """Record until all services have ended. The log is readable however the run ends.
+
+    Args:
+        process: this process as a participant of the run.
+        spec: its `ProcessSpec`.
+
+    Raises:
+        Stopped: this process was requested to end.
+        LockStepError: a log packet is missing, or a participant did not appear or confirm.
+        ValueError: the log cannot be written.
+    """
     setup = process.setup
     senders: dict[str, bytes | None] = {}
     late: dict[str, Lateness] = {}

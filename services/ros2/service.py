@@ -19,8 +19,12 @@ from lapwing.services.ros2.node import Node
 def run(process: Participant, spec: Any) -> None:
     """Publish until the run has ended or this process is requested to stop; then print a report.
 
+    Args:
+        process: this process as a participant of the run.
+        spec: its `ProcessSpec`.
+
     Raises:
-        ValueError: the graph cannot be joined.
+        ValueError: the node cannot reach or open a Zenoh router.
     """
     setup = process.setup
     topics, senders = {}, {}

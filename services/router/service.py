@@ -10,7 +10,15 @@ from lapwing.cosim.executors.participant import POLL, Participant, Stopped
 
 
 def run(process: Participant, spec: Any) -> None:
-    """Route until the recorder has the entire run or this process is requested to stop."""
+    """Route until the recorder has the entire run.
+
+    Args:
+        process: this process as a participant of the run.
+        spec: its `ProcessSpec`.
+
+    Raises:
+        Stopped: this process was requested to end.
+    """
     process.join()
     process.confirm()  # the router reads no messages
     process.stop_without("recorder")

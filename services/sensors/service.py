@@ -1,4 +1,4 @@
-"""Sensor service: true state in, readings of each instrument out."""
+"""Sensor service: computes the readings of each instrument from the true state."""
 
 import sys
 from typing import NamedTuple

@@ -2,6 +2,8 @@
 
 import importlib.util
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -58,6 +60,14 @@ def test_service_of_two_hosts_has_certificate_of_its_name():
             assert (service["cap_drop"], service["security_opt"]) == (["ALL"], ["no-new-privileges:true"])
             port = peers_of(service["command"])[name].rpartition(":")[2]
             assert service["healthcheck"]["test"][-1] == f": < /dev/tcp/{address}/{port}"
+
+
+def test_kubernetes_names_unknown_scene():
+    command = [sys.executable, str(ROOT / "deploy" / "kubernetes.py"), "no_such_scene"]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
+    assert done.returncode == 2
+    (line,) = done.stderr.splitlines()
+    assert "no_such_scene" in line
 
 
 def test_kubernetes_accepts_manifests():

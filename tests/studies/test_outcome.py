@@ -113,6 +113,8 @@ def test_unfinished_mission_times_out_with_its_mode():
     outcome = fly(Mission(None), finished=False)
     assert (outcome.kind, outcome.time) == ("timed out", 4.99)
     assert outcome.how == "mission not finished, in mission (land)"
+    unknown = fly(Mission(None), finished=False, status={"mode": "", "phase": ""})
+    assert unknown.how == "mission not finished"
     grounded = fly(Mission(None), finished=False, status={"armed": False})
     assert grounded.how == "mission not finished, motors never armed"
 

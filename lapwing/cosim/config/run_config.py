@@ -28,7 +28,7 @@ class RunConfig(NamedTuple):
     """Resolved run.
 
     In a fleet (`lapwing.cosim.diagram.multi_vehicle.merge_configs`) the parameters of a service are each
-    vehicle's `ServiceConfig`, and the names of ports begin with the vehicle's: "left/ground_truth".
+    vehicle's `ServiceConfig`, and the names of ports begin with the vehicle's: "left/truth".
     """
 
     scene: str  # name of the scene

@@ -25,7 +25,7 @@ NEVER = 2**62  # [tick]
 
 @dataclass
 class Service:
-    """Running lock-step service: its blocks in their order, and its topics.
+    """Lock-step service of a run: its blocks in order of execution, and its topic encoders.
 
     A block is a compiled `Block`, or a Python object with a `name`, `outputs` (ports), and the methods `bind(diagram)`,
     called before the first tick, and `on_tick(tick)`, which runs the block and returns the tick of its next wake-up, or
@@ -42,7 +42,7 @@ class Service:
 
     @property
     def topics(self) -> list[Topic]:
-        """All topics that it publishes."""
+        """Topics that the service publishes."""
         return [*(encoder.topic for encoder in self.encoders), *self.python_topics]
 
 
@@ -117,18 +117,18 @@ class BlockDiagram(PortRows):
         return [part for part in self._parts if hasattr(part, "reports")]
 
     def open(self, report_wait: Callable[[str], None] = lambda text: None) -> None:
-        """Connect the blocks that have a connection; see `Service`."""
+        """Connect the blocks to their programs outside the run. `report_wait` receives a text for each wait."""
         for part in self._connected:
             part.open(report_wait)
 
     def close(self) -> None:
-        """Close the connections of these blocks."""
+        """Close the connections to programs outside the run."""
         for part in self._connected:
             part.close()
 
     @property
     def reports(self) -> dict[str, str]:
-        """Entries of these blocks for the log's metadata."""
+        """Entries for the log's metadata from the blocks with a connection to a program outside the run."""
         return {key: text for part in self._connected for key, text in part.reports.items()}
 
     def part(self, name: str) -> Block:
@@ -140,7 +140,7 @@ class BlockDiagram(PortRows):
         return bind(part, self.ports, self._rows)
 
     def replace(self, part: Block, code: BoundBlock) -> None:
-        """Replace the block of the same name by a prepared one, which starts from its own state."""
+        """Replace the block of the same name by a prepared one, which continues from the state in its own cell."""
         k = self._parts.index(self.part(part.name))
         self._parts[k], self._codes[k] = part, code
         next(group for group in self._groups if k in group.parts).replace(k, code)
@@ -154,7 +154,7 @@ class BlockDiagram(PortRows):
                 calls that method and returns its result.
 
         Raises:
-            LockStepError: the state of a block is invalid.
+            LockStepError: the state of a block is invalid, or a Python block failed.
         """
         if self.ended:
             return

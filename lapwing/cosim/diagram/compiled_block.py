@@ -32,7 +32,7 @@ CONTINUE, WAKE_PYTHON, FINISHED, NON_FINITE = range(4)
 
 
 class InputSample(NamedTuple):
-    """Sample of an input at a tick; the value is meaningless unless a sample is due."""
+    """Sample of an input at a tick; the value is undefined unless a sample is due."""
 
     due: bool
     value: Any
@@ -99,7 +99,13 @@ class BoundBlock(NamedTuple):
 
 
 def bind(part: Block, ports: dict[str, Port], rows: dict[str, np.ndarray]) -> BoundBlock:
-    """Compile or load a block on the rows of its ports."""
+    """Compile or load a block, and bind it to the rows of its ports.
+
+    Args:
+        part: block.
+        ports: ports by name.
+        rows: ring buffer of each port by name, shape (2^k, width).
+    """
     inputs = tuple(InputRing(ports[i.port].like, rows[i.port], ports[i.port].period, i.delay) for i in part.inputs)
     outputs = tuple(OutputRing(rows[port.name], port.period) for port in part.outputs)
     cell = Cell(BlockData(part.parameters, part.state, inputs, outputs))
@@ -123,7 +129,7 @@ def step(parameters: types.Type, state: types.Type, tick: types.Type, inputs: ty
 
 @always_inline
 def ring_index(stamp: int, period: int, rows: np.ndarray) -> int:
-    """Return the index of the sample with the tick `stamp` in a ring of 2^k rows."""
+    """Return the index of the sample with the tick `stamp` in the ring buffer `rows`, shape (2^k, width)."""
     if period == 1:
         return stamp & (rows.shape[0] - 1)
     return 0 if period == LATCHED else (stamp // period) & (rows.shape[0] - 1)

@@ -52,6 +52,9 @@ class ExecutionGroup:
             stop: last tick (exclusive).
             on_tick: runs the Python block of a number at a tick; returns the tick of its next wake-up.
             failure: returns the error of a block whose state is invalid at a tick.
+
+        Raises:
+            LockStepError: the error of `failure`, or one that a Python block raises.
         """
         k = 0
         while not self.finished:

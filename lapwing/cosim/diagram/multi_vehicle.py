@@ -164,12 +164,12 @@ class VehicleBlock:
         return self._part.on_tick(tick)
 
     def failure(self, tick: int) -> Exception:
-        """Return the error of `tick` of a block that has compiled code."""
+        """Return the error of the block's compiled code at `tick`."""
         return _failure(self.vehicle, self._part.failure, tick)
 
 
 class ConnectedVehicleBlock(VehicleBlock):
-    """A Python block of a vehicle with a connection to a program outside the run."""
+    """Python block of a vehicle with a connection to a program outside the run."""
 
     def open(self, report_wait: Callable[[str], None]) -> None:
         """Connect."""

@@ -19,14 +19,13 @@ from lapwing.cosim.transport.packet_schedule import ticks_per_packet
 def run_lockstep(process: Participant, service: Service, owns_time: bool, recorder: str) -> None:
     """Step `service` from tick 0 to the last tick of the run.
 
+    An empty step packet is the last one of a service. The clock owner also publishes whether the run was completed.
+
     Args:
         process: the participant.
         service: service to step.
         owns_time: True if this process sets the pace and decides which tick is the last.
         recorder: the participant for whose log the clock owner waits.
-
-    The end travels with the step packets: an empty one is the last. The clock owner publishes in addition
-    whether that was the end of the run.
 
     Raises:
         Stopped: this process was requested to end.
@@ -150,7 +149,7 @@ def run_encoder(process: Participant, service: Service) -> None:
 def pin(core: int) -> None:
     """Keep all threads of this process on one core.
 
-    In sequential lock step only one process works at a time, and a switch on one core costs half as much as waking
+    With Gauss-Seidel coupling only one process works at a time, and a switch on one core costs half as much as waking
     another core (docs/reference/benchmarks.md).
     """
     if hasattr(os, "sched_setaffinity"):
@@ -160,10 +159,10 @@ def pin(core: int) -> None:
 
 
 def batch() -> None:
-    """Put this process into the scheduler's batch class, unless it has a special class.
+    """Put this process into the scheduler's batch class (SCHED_BATCH), unless its class is not the default.
 
-    A thread that it wakes then runs when it waits, instead of interrupting it. On a core that all services share, that
-    saves a third of the thread switches (docs/reference/benchmarks.md).
+    A thread that this process wakes then runs when this process waits, instead of interrupting it. On a core that all
+    services share, that saves a third of the thread switches (docs/reference/benchmarks.md).
     """
     if hasattr(os, "SCHED_BATCH") and os.sched_getscheduler(0) == os.SCHED_OTHER:
         for thread in os.listdir("/proc/self/task"):

@@ -13,7 +13,7 @@ _PROGRESS = struct.Struct("<q?")  # first tick that is not recorded; True while 
 
 
 class LogProgressPublisher:
-    """Publisher of the progress of a run's log, for its recorder."""
+    """Publisher of the progress of a run's log; the recorder uses it."""
 
     def __init__(self, bus: ZenohBus, key_prefix: str, name: str):
         """Publish for the recorder `name`."""

@@ -65,7 +65,7 @@ class Participant(StopRequest):
             participants: publisher GIDs of the run.
             others: participants without which the run cannot begin.
             speed: simulated seconds per second; None for as fast as possible.
-            core: processor core that all services of a sequential lock step share; None for any.
+            core: processor core that all services share with Gauss-Seidel coupling; None for any.
             compares: participants that may have another run configuration, which is compared at joining.
             realtime: True to run in the scheduler's real-time class.
         """
@@ -87,7 +87,7 @@ class Participant(StopRequest):
     def packs_ticks(self) -> bool:
         """True if a service that runs ahead sends several ticks in a packet (see `packet_schedule`).
 
-        External services and services on several hosts take one tick at a time.
+        External services and services on several hosts exchange one tick at a time.
         """
         return not (self.participants.external or self.compares)
 

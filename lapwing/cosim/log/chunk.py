@@ -1,4 +1,4 @@
-"""Messages of a chunk: conversion of columns to MCAP message records in order, and their index."""
+"""Messages of a chunk: conversion of columns to ordered MCAP message records, and their index."""
 
 import struct
 from functools import cache
@@ -27,7 +27,7 @@ class Rows(NamedTuple):
 
     topic: WrittenTopic
     records: np.ndarray  # MCAP message records, shape (n,); their sequence numbers are filled in later
-    order: np.ndarray  # int64, shape (n,): ascending position keys within a chunk
+    order: np.ndarray  # int64, shape (n,): ascending sort keys within a chunk
 
 
 class Index(NamedTuple):
@@ -59,7 +59,7 @@ def rows(topic: WrittenTopic, times_ns: np.ndarray, payloads: np.ndarray, order:
         topic: topic of the messages.
         times_ns: simulation times [ns], shape (n,).
         payloads: uint8, shape (n, size).
-        order: position keys, shape (n,).
+        order: sort keys of the messages within the chunk, shape (n,).
     """
     n, size = payloads.shape
     records = np.empty(n, _record_dtype(size))
@@ -105,7 +105,7 @@ def arrange(parts: list[Rows]) -> Messages:
     """Number the messages of each topic, and arrange all messages in ascending order.
 
     Args:
-        parts: at least one message; of equal position keys, the earlier part is first.
+        parts: at least one message; for equal sort keys, the earlier part is first.
     """
     for topic, of_topic in _by_topic(parts).items():
         for part, places in zip(of_topic, _places(of_topic), strict=True):

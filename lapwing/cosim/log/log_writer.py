@@ -127,7 +127,7 @@ class LogWriter:
 
     @property
     def digest(self) -> str:
-        """Digest of the deterministic messages so far (hex)."""
+        """BLAKE2b digest of the deterministic messages so far, hexadecimal."""
         self.flush()
         return self._digest.hexdigest()
 
@@ -135,6 +135,9 @@ class LogWriter:
         """Write the remaining messages, the metadata with the digest, and the summary; close the file.
 
         If a chunk could not be written, the file ends after the last complete chunk.
+
+        Raises:
+            ValueError: the log cannot be written.
         """
         if self._file.closed:
             return

@@ -96,7 +96,7 @@ class Contents:
             self._read_declarations(skip_damaged)
 
     def read_chunk(self, offset: int, channels: Collection[int]) -> list[tuple[int, int, bytes]]:
-        """Yield time, channel and payload of a chunk's messages of some channels, in order of writing.
+        """Return time [ns], channel and payload of a chunk's messages of some channels, in order of writing.
 
         Raises:
             ValueError: the chunk is damaged.

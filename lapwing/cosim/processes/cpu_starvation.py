@@ -40,8 +40,10 @@ def _scheduled(pid: int) -> tuple[float, float]:
 
 
 def machine_stall_time() -> float:
-    """Return the time [s] since the start of the system in which any process waited for the disk or for memory, plus
-    the time in which a hypervisor ran other machines; 0 for each that the system does not count."""
+    """Return the time [s] since the start of the system in which the machine could not run its processes.
+
+    It is the time in which any process waited for the disk or for memory, plus the time in which a hypervisor ran other
+    machines; 0 for each that the system does not count."""
     result = 0.0
     for path in PRESSURE:
         with suppress(OSError, IndexError, ValueError):

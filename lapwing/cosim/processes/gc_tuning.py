@@ -7,8 +7,9 @@ OBJECTS = 50_000  # new objects between two collections; with Python's 700, coll
 
 
 def relax_gc() -> None:
-    """Collect garbage rarely, and not at exit: numba leaves so many objects that the last collection takes a third of
-    the start-up time."""
+    """Collect garbage rarely, and not at exit.
+
+    Numba leaves so many objects that the last collection takes a third of the start-up time."""
     gc.set_threshold(OBJECTS)
     atexit.unregister(gc.freeze)
     atexit.register(gc.freeze)

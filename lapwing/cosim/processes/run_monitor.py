@@ -103,8 +103,8 @@ class RunMonitor:
     def poll(self, seconds: float) -> None:
         """Read the messages that arrive within `seconds`, then all that are pending.
 
-        On a busy machine the time may pass before a message is read, and the process would fall further and further
-        behind.
+        On a busy machine the time may pass before a message is read; without the pending ones the monitor would fall
+        behind more and more.
         """
         deadline = time.monotonic() + seconds
         while (remaining := deadline - time.monotonic()) > 0:

@@ -84,8 +84,8 @@ def less_loaded_core(core: int, own: float, loads: Mapping[int, float]) -> int |
 
     Args:
         core: present core.
-        own: share of its time that the thread and its programs use.
-        loads: busy share of the time of each core that may be used.
+        own: share of the time of `core` that the thread and its programs use, 0 to 1.
+        loads: busy share of the time of each core that may be used, 0 to 1.
     """
     others = {each: load for each, load in loads.items() if each != core}
     if not others:

@@ -80,7 +80,7 @@ class RunSupervisor:
         self._check_outcome()
 
     def update(self) -> None:
-        """Check the processes and the messages that have arrived, and set `state`. See `supervise` for errors."""
+        """Check the processes and the messages that have arrived, and set `state`. See `supervise` for exceptions."""
         now = self._clock()
         if now - self._updated > STALL:  # this process was stopped or starved: its messages are late
             self._monitor.last_news = now

@@ -111,6 +111,6 @@ def merge_tables(content: dict[str, Any], override: Any) -> Any:
 
 
 def unvalidated_value(tree: dict[str, Any], table: str, key: str, default: Any = None) -> Any:
-    """Return the value of a key in data that is not validated yet; None without such a table."""
+    """Return the value of a key in data that is not validated yet, or `default`; None without such a table."""
     result = tree.get(table)
     return result.get(key, default) if isinstance(result, dict) else None

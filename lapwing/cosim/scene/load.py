@@ -44,7 +44,7 @@ def parse(path: Path, text: str, overrides: Overrides, vocabulary: Vocabulary) -
 
 
 def with_overrides(scene: Scene, overrides: Overrides, vocabulary: Vocabulary) -> Scene:
-    """Return a loaded scene with further overrides, of which the last for a key applies. Its files are read again.
+    """Return a loaded scene with further overrides; the last one for a key applies. Its files are read again.
 
     Raises:
         SceneError: names the key, the fault and the expected value.

@@ -121,7 +121,7 @@ class ZenohBus:
         """Subscribe to known senders.
 
         Args:
-            senders: by key the GID of a message; None to accept that of the first message.
+            senders: GID of the messages by key; None to accept the GID of the first message.
             deferred: see `Subscription`.
         """
         return self._receive(senders, Subscription(_message, dict(senders), self._count_rejected, deferred))

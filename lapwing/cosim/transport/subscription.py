@@ -59,7 +59,7 @@ class Subscription:
 
     @property
     def pending(self) -> int:
-        """Number of messages that have arrived and are not taken; some of them may be rejected."""
+        """Number of messages that have arrived and are not read; some of them may be rejected later."""
         return self._arrived.qsize()
 
     def wake(self) -> None:

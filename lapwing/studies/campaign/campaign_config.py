@@ -5,7 +5,7 @@ from lapwing.cosim.scene import Scene
 from lapwing.messages.topics import ACTUATORS, ESTIMATE, ESTIMATE_COVARIANCE, SETPOINT, STATUS, TRUTH
 from lapwing.services.autopilot.schema import Autopilot
 from lapwing.services.common.communication_schema import Communication, Rates
-from lapwing.services.common.firmware.schema import flown_by_firmware
+from lapwing.services.common.firmware.schema import TABLE, firmware_of, flown_by_firmware
 from lapwing.services.common.run_schema import follows_trajectory
 from lapwing.services.scene_resolver import resolve
 
@@ -16,7 +16,7 @@ def campaign_setup(scene: Scene) -> RunConfig:
     """Return the run configuration of a flight, with an estimate at every tick.
 
     Raises:
-        ValueError: a vehicle has neither a trajectory nor a firmware with a mission.
+        ValueError: a vehicle has neither a trajectory nor a firmware, or the scene does not start its firmware.
     """
     if scene.vehicles:
         for vehicle in scene.vehicles:
@@ -29,3 +29,6 @@ def campaign_setup(scene: Scene) -> RunConfig:
 def _check(scene: Scene) -> None:
     if not scene.has(Autopilot) or not (follows_trajectory(scene) or flown_by_firmware(scene)):
         raise ValueError(f"{scene.path}: expected a scene whose autopilot follows a [trajectory]")
+    if flown_by_firmware(scene) and not scene.section(TABLE).command:
+        fault = f"each flight starts {firmware_of(scene)}; expected the program and its arguments, a list of texts"
+        raise ValueError(f"{scene.path}: {TABLE}.command: {fault}")

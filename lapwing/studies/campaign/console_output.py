@@ -29,11 +29,12 @@ def show(console: Console, results: Results) -> None:
     _table(console, "Root-mean-square error between reference and ground truth", "rmse", results)
     if results.on_estimate:
         _table(console, "Root-mean-square error between reference and estimate", "rmse_estimate", results)
-        shares = ", ".join(f"{axis} {results[f'within_3sigma.{axis}'].mean():.2%}" for axis in "xyz")
-        console.print(f"Ground truth within 3 sigma of the estimate: {shares} of the time")
         least = {axis: results.spread(f"within_3sigma.{axis}") for axis in "xyz"}
         text = ", ".join(f"{axis} {s.worst:.1%} (run {s.run})" for axis, s in least.items() if s)
-        console.print(f"Lowest share of a flight: {text}")
+        if text:  # a foreign firmware reports no standard deviations
+            shares = ", ".join(f"{axis} {results[f'within_3sigma.{axis}'].mean():.2%}" for axis in "xyz")
+            console.print(f"Ground truth within 3 sigma of the estimate: {shares} of the time")
+            console.print(f"Lowest share of a flight: {text}")
         for line in consistency_lines(results):
             console.print(line)
     if results.vehicles:

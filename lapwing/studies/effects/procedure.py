@@ -10,6 +10,7 @@ from lapwing.cosim.scene import Scene
 from lapwing.dynamics import effects
 from lapwing.dynamics.effects._vehicle_interaction import INTERACTION
 from lapwing.services.autopilot.schema import Autopilot
+from lapwing.services.common.firmware.schema import OWN, firmware_of, flown_by_firmware
 from lapwing.services.common.vehicle_schema import Vehicle
 from lapwing.studies.effects.cost import costs
 from lapwing.studies.effects.variants import (
@@ -115,12 +116,16 @@ def study(
         only: names of the effects to remove or add; None for all.
 
     Raises:
-        ValueError: a vehicle's model has no effects, `only` has an unknown one, or the flight of the scene fails.
+        ValueError: a vehicle's model has no effects, a foreign firmware flies one, `only` has an unknown effect, or the
+            flight of the scene fails.
     """
     vehicles = scene.each_vehicle
     for vehicle in vehicles:
         if not vehicle.has(Autopilot):
             raise ValueError(f"{scene.path}: the model {vehicle[Vehicle].model} has no effects; expected a multirotor")
+        if flown_by_firmware(vehicle):
+            fault = f"flights of {firmware_of(vehicle)} are not repeatable"
+            raise ValueError(f'{scene.path}: {fault}; expected autopilot.firmware = "{OWN}"')
     tables = tables_of(scene)
     present = names_of(tables)
     names = sorted({*effects.names(), *present} if only is None else set(only))

@@ -85,6 +85,14 @@ def test_betaflight_flies_square_and_lands_at_its_end(command, tmp_path):
     assert "is identical" in again.stdout
 
 
+def test_campaign_reports_no_share_of_missing_estimate(command, tmp_path):
+    done = lapwing("campaign", "betaflight_quad", "--runs", "1", "--workers", "1", "--out", str(tmp_path / "campaign"),
+                   "--set", command, "--set", "run.duration=1", "--set", "autopilot.start_timeout=300")  # fmt: skip
+    skip_if_starved(done)
+    assert done.returncode == 0, done.stderr
+    assert "nan%" not in done.stdout
+
+
 def test_line_rejected_by_firmware_is_reported(command, tmp_path):
     lines = tmp_path / "lines.txt"
     lines.write_text("set no_such_setting = 3\n")
