@@ -134,19 +134,19 @@ def test_invalid_run_is_rejected_in_one_line(lapwing, arguments, expected):
         (["replay", "none.mcap", "--listen", "tcp/[::]:7999"], "127.0.0.1:7447, or --insecure"),
         (
             ["replay", "none.mcap", "--listen", "tcp/[::1]:7999"],
-            "none.mcap: cannot be read: no such file or directory; expected a log",
+            "none.mcap: cannot be read: no such file",
         ),
         (
             ["replay", "none.mcap", "--listen", "tcp/localhost:7999"],
-            "none.mcap: cannot be read: no such file or directory; expected a log",
+            "none.mcap: cannot be read: no such file",
         ),
         (
             ["replay", "none.mcap", "--listen", "unixsock-stream/x"],
-            "none.mcap: cannot be read: no such file or directory; expected a log",
+            "none.mcap: cannot be read: no such file",
         ),
         (
             ["replay", "none.mcap", "--listen", "tcp/0.0.0.0:7999", "--insecure"],
-            "none.mcap: cannot be read: no such file or directory; expected a log",
+            "none.mcap: cannot be read: no such file",
         ),
         (
             ["replay", "none.mcap", "--foxglove", "[::]:8799"],
