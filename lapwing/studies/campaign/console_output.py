@@ -21,7 +21,7 @@ VEHICLE_FIGURES = ("rmse.x", "rmse.y", "rmse.z", "max_distance", "touchdown.spee
 VEHICLE_COLUMNS = ("x [m]", "y [m]", "z [m]", "farthest [m]", "touchdown [m/s]", "success")
 VEHICLES = "Worst run and success rate of each vehicle"
 # a terminal of 80 columns shows all columns
-NARROW: dict[str, Any] = {"box": SIMPLE_HEAD, "show_edge": False, "pad_edge": False, "padding": (0, 1, 0, 0)}
+NARROW: dict[str, Any] = {"box": SIMPLE_HEAD, "show_edge": False, "pad_edge": False, "padding": 0}
 LISTED = 10  # failures and rejected runs
 
 
