@@ -218,8 +218,12 @@ def _fly(
     from lapwing.studies.campaign.shard_loop import campaign as study
 
     start, previous = time.monotonic(), -1
-    own_runs = sum(len(folder.shards[k]) for k in folder.missing() if part is None or k in part)  # runs
-    with StudyProgress(screen, "flights", parallel, LINES, until is not None) as progress:
+    own_shards = [k for k in range(len(folder.shards)) if part is None or k in part]
+    own_runs = sum(len(folder.shards[k]) for k in own_shards)
+    before = own_runs - sum(len(folder.shards[k]) for k in folder.missing() if k in own_shards)  # recorded earlier
+    if before:
+        screen.print(f"{folder.path}: {before} of {own_runs} runs were done before", soft_wrap=True)
+    with StudyProgress(screen, "flights", parallel, LINES, until is not None, before) as progress:
 
         def say(count: Count) -> None:
             nonlocal previous
@@ -227,6 +231,6 @@ def _fly(
             finished, rate = count.runs - previous, (count.runs - previous) / max(time.monotonic() - start, 1e-9)
             p = count.failure
             text = f"{rate:.1f} runs/s, {count.failures} failures, {p.low:.1%} to {p.high:.1%}"
-            progress.say(text, finished, own_runs)
+            progress.say(text, before + finished, own_runs)
 
         study(folder, first, workers, say, until, part)

@@ -205,7 +205,7 @@ def _horizons(text: str) -> tuple[int, ...]:
 def _check_flights(flights: list[Path], mapping: str | None) -> None:
     for path in flights:
         if not path.exists():
-            raise ValueError(f"{path}: no such file; use the path of a recorded flight")
+            raise ValueError(f"{path}: no such file or directory; expected a recorded flight")
     _check_mapping(flights, mapping)
 
 

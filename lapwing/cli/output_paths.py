@@ -101,6 +101,8 @@ def check_log(path: Path | None) -> None:
         return
     if path.exists() and not path.is_file() and not path.is_dir():
         raise ValueError(f"{path}: is not a regular file; expected the path of an output file")
+    if path.suffix not in ("", ".mcap") and not path.is_dir():
+        raise ValueError(f"{path}: is not the name of a log; expected a name that ends in .mcap")
     _create(path)
     with write_errors(path):
         OutputLock(path).close()

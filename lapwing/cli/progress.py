@@ -111,7 +111,15 @@ class RunProgress(_TerminalBar):
 class StudyProgress(_TerminalBar):
     """Progress display with the number of finished flights of a study, and its remaining time."""
 
-    def __init__(self, console: Console, unit: str, parallel: int = 0, every: float = 0.0, most: bool = False):
+    def __init__(
+        self,
+        console: Console,
+        unit: str,
+        parallel: int = 0,
+        every: float = 0.0,
+        most: bool = False,
+        before: int = 0,
+    ):
         """Create the display.
 
         Args:
@@ -120,7 +128,9 @@ class StudyProgress(_TerminalBar):
             parallel: number of parts that run at the same time; 0: unknown or unequal parts, without a remaining time.
             every: [s] least time between two lines.
             most: the study may end before all parts are finished.
+            before: number of parts that an earlier command has finished; the remaining time does not count them.
         """
+        self._before = before
         self._console, self._left, self._unit, self._most = console, TimeLeft(parallel), unit, most
         self._every, self._printed = every, -every
         columns = (BarColumn(bar_width=24), TextColumn("{task.completed} of {task.total} {task.fields[rest]}"))
@@ -132,8 +142,8 @@ class StudyProgress(_TerminalBar):
 
     def say(self, text: str, done: int, total: int) -> None:
         """Show that `done` of `total` parts are finished, and the current work."""
-        self._left.done(done)
-        remaining = self._left.text(total, self._most)
+        self._left.done(done - self._before)
+        remaining = self._left.text(total - self._before, self._most)
         if self._bar and self._task is not None:
             rest = f"{self._unit}  {remaining}"
             self._bar.update(self._task, description=text, completed=done, total=max(total, 1), rest=rest)

@@ -6,14 +6,14 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
-from lapwing.cosim.config.provenance import attachments, failure, metadata
+from lapwing.cosim.config.provenance import ENDED, attachments, failure, metadata
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram, Service
 from lapwing.cosim.diagram.multi_vehicle import primary_topic
 from lapwing.cosim.executors.single_process import PAGE, run_single
 from lapwing.cosim.log import LogWriter
 from lapwing.cosim.log.log_sequencer import Recording
-from lapwing.cosim.processes.interrupt import Interrupted, Stop
+from lapwing.cosim.processes.interrupt import Stop
 from lapwing.cosim.run_errors import DivergedError, LockStepError
 from lapwing.messages.topics import POSE, STATUS
 from lapwing.runs.compile_notice import notify_on_compile
@@ -79,6 +79,6 @@ def fly_single(
             graph.close()
         wall = time.perf_counter() - started
         if stop.number is not None:
-            writer.metadata |= failure(str(Interrupted(stop.number)))
+            writer.metadata |= failure(ENDED)
         stop.check()
     return Elapsed((graph.tick - 1) * setup.interval, wall)

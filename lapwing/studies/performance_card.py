@@ -121,6 +121,8 @@ def _vehicle(subject: Path) -> tuple[Airframe, performance.Rotor]:
             return loaded, performance.rotor_of(loaded)
         except ValueError as error:
             raise ValueError(f"{subject}: {error}") from None
+    if not subject.exists() and subject.suffix:
+        raise ValueError(f"{subject}: no such file or directory; expected an airframe or scene file (.toml)")
     scene = load(subject)
     frame, rotor = airframe(scene), rotor_constants(scene)
     return frame, performance.rotor_of(frame) if rotor.with_density else performance.Rotor(*rotor)

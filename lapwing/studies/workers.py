@@ -24,11 +24,20 @@ Workers = Callable[[Callable[..., Any], Iterable[tuple]], Iterator[tuple[int, An
 """(call, tasks) -> (index of the task, call(*task)) in order of completion."""
 
 
+REPEAT = "run the same command again"  # advice after a lost process
+CONTINUE = f"{REPEAT} to continue"  # if the results so far are kept
+
+
 @contextmanager
-def workers(number: int) -> Iterator[ProcessPoolExecutor]:
+def workers(number: int, advice: str = REPEAT) -> Iterator[ProcessPoolExecutor]:
     """Yield a pool of processes that end with the block, immediately on an error, or with this process.
 
+    Args:
+        number: number of processes.
+        advice: end of the message about a lost process.
+
     Raises:
+        RunFailed: a process is lost.
         ValueError: inter-process communication is not available.
     """
     # spawned: a fork of a process with threads may hang, and would inherit the other end of the pipe
@@ -37,8 +46,11 @@ def workers(number: int) -> Iterator[ProcessPoolExecutor]:
     with ours, _pool(number, context, theirs) as pool:
         try:
             yield pool
-        except BaseException:
+        except BaseException as error:
             ours.close()  # unfinished work is not needed
+            if isinstance(error, BrokenProcessPool):
+                message = "a worker process has ended unexpectedly, perhaps out of memory"
+                raise RunFailed(f"{message}; {advice}") from None
             raise
         finally:
             pool.shutdown(cancel_futures=True)
@@ -54,14 +66,10 @@ def processes(count: int) -> Workers:
     """Return a function like `run_here` that uses `count` processes and yields results as they complete."""
 
     def run(call: Callable[..., Any], tasks: Iterable[tuple]) -> Iterator[tuple[int, Any]]:
-        with workers(count) as pool:
+        with workers(count, CONTINUE) as pool:
             indices = {pool.submit(call, *task): index for index, task in enumerate(tasks)}
-            try:
-                for future in as_completed(list(indices)):
-                    yield indices.pop(future), future.result()
-            except BrokenProcessPool:
-                message = "a worker process has ended unexpectedly, perhaps out of memory"
-                raise RunFailed(f"{message}; run the same command again to continue") from None
+            for future in as_completed(list(indices)):
+                yield indices.pop(future), future.result()
 
     return run
 

@@ -62,7 +62,8 @@ def read(path: Path, standing_height: float = 0.0, home: Home = STANDARD.home) -
     try:
         text = read_text(path)
     except OSError as error:
-        raise ValueError(f"{path}: {(error.strerror or 'cannot be read').lower()}") from None
+        reason = (error.strerror or str(error)).lower()
+        raise ValueError(f"{path}: cannot be read: {reason}; expected a mission file (.plan, .waypoints)") from None
     except UnicodeDecodeError:
         raise ValueError(f"{path}: not a UTF-8 text file; expected a .plan or .waypoints file") from None
     return parse(path, text, standing_height, home)

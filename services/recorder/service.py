@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.cosim.config.provenance import WAITED, attachments, failure, metadata
+from lapwing.cosim.config.provenance import ENDED, WAITED, attachments, failure, metadata
 from lapwing.cosim.diagram.topic_encoder import RecordBatch
 from lapwing.cosim.executors.deadlines import Lateness, lateness, metadata_entries
 from lapwing.cosim.executors.log_backpressure import LogProgressPublisher
@@ -68,7 +68,7 @@ def run(process: Participant, spec: Any) -> None:
                 progress.recorded(pending.written)  # also if no tick was completed: shows that the recorder runs
             process.confirm()
         except Stopped:
-            writer.metadata = failure("the run was ended") | writer.metadata
+            writer.metadata = failure(ENDED) | writer.metadata
             raise
         except LockStepError as error:
             writer.metadata = failure(str(error)) | writer.metadata

@@ -217,7 +217,7 @@ def test_unusable_files_raise_clear_errors(path, tmp_path):
         LogWriter(tmp_path / "missing" / "run.mcap", {}, {})
     with pytest.raises(ValueError, match="cannot write the log: Is a directory"):
         LogWriter(tmp_path, {}, {})
-    with pytest.raises(ValueError, match="cannot read the log: No such file"):
+    with pytest.raises(ValueError, match="cannot be read: no such file"):
         LogReader(path)
     for text, message in ((b"", "is empty"), (b"hello, this is text", "not an MCAP file")):
         path.write_bytes(text)

@@ -75,7 +75,7 @@ def test_interrupted_run_is_aborted_with_report(lapwing, monkeypatch):
     monkeypatch.setattr(single_process_run, "run_single", interrupted)
     code, out, err = lapwing(*HOVER)
     assert (code, err) == (130, "lapwing: ended by SIGINT\n")
-    assert "Aborted at 2.00 s: ended by SIGINT" in out
+    assert "Aborted at 2.00 s: the run was ended" in out
     assert FlightData.read("a.mcap").outcome.kind == "aborted"
     assert Path("a.html").exists()
 

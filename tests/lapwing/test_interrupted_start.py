@@ -1,9 +1,12 @@
 """Ctrl-C during the imports of the command: one line and exit code 130, from its first statement on."""
 
+import os
+import re
 import signal
 import subprocess
 import sys
 import textwrap
+from pathlib import Path
 
 import pytest
 
@@ -87,3 +90,22 @@ entry_point.main()
 def test_interrupt_in_class_definition_has_line_and_exit_code():
     done = subprocess.run([sys.executable, "-c", IN_CLASS], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "lapwing: ended by SIGINT\n")
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("mode", ["single-process", "multi-process"])
+def test_ctrl_c_in_flight_has_equal_text_in_both_modes(tmp_path, mode):
+    command = [sys.executable, "-m", "lapwing", "run", "hover", "--speed", "0.1", "--mode", mode]
+    environment = os.environ | {"PYTHONPATH": str(Path.cwd())}
+    flown = subprocess.Popen(
+        command, cwd=tmp_path, env=environment, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    )
+    try:
+        while not (line := flown.stdout.readline()).startswith("t ="):
+            assert line, flown.stderr.read()
+        flown.send_signal(signal.SIGINT)
+        out, err = flown.communicate(timeout=120)
+    finally:
+        flown.kill()
+    assert (flown.returncode, err) == (130, "lapwing: ended by SIGINT\n")
+    assert re.search(r"^Aborted at \d+\.\d\d s: the run was ended$", out, re.MULTILINE)

@@ -285,7 +285,7 @@ def test_unchanged_types_of_other_version_are_replayed(lapwing, old):
 @pytest.mark.parametrize(
     ("arguments", "output"),
     [
-        (["info", "none.mcap"], "none.mcap: cannot read the log"),
+        (["info", "none.mcap"], "none.mcap: cannot be read: no such file or directory; expected a log"),
         (["info", "text.mcap"], "text.mcap: not an MCAP file; `lapwing import`"),
         (["verify", "whole.mcap", "whole.mcap"], "is the same file as FILE"),
         (["verify", "foreign.mcap"], "has no digest"),

@@ -31,8 +31,8 @@ def test_invalid_log_is_rejected_in_one_line(lapwing, log, monkeypatch, tmp_path
     monkeypatch.setattr(rerun, "program", lambda: None)
     (tmp_path / "text.mcap").write_text("no log")
     for arguments, output in (
-        (["none.mcap"], "none.mcap: cannot read the log"),
-        (["none.mcap", "--rerun"], "none.mcap: cannot read the log"),
+        (["none.mcap"], "none.mcap: cannot be read: no such file or directory; expected a log"),
+        (["none.mcap", "--rerun"], "none.mcap: cannot be read: no such file or directory; expected a log"),
         (["text.mcap"], "text.mcap: not an MCAP file"),
         ([log, "--rerun"], "Rerun is not installed; pip install lapwing[view]"),
     ):

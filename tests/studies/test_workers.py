@@ -69,3 +69,31 @@ def test_unavailable_workers_error_is_one_line(monkeypatch):
     output = "worker processes need semaphores: read-only file system; expected a /dev/shm to write to"
     with pytest.raises(ValueError, match=output), workers(2):
         pass
+
+
+LOST = """
+import os
+import lapwing.studies.stability.case_runner as case_runner
+from lapwing.cli.entry_point import main
+from lapwing.studies.stability import stability_command
+
+def lost(name, sweep):
+    os._exit(9)
+
+case_runner.run_case = lost
+case_runner.os.cpu_count = lambda: 2
+if __name__ == "__main__":
+    main()
+"""
+
+
+def test_lost_worker_of_study_is_one_line_without_resumption(tmp_path):
+    (tmp_path / "loses.py").write_text(LOST)
+    command = [sys.executable, str(tmp_path / "loses.py"), "stability"]
+    environment = {**os.environ, "PYTHONPATH": str(Path.cwd())}
+    done = subprocess.run(
+        command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=PATIENCE, check=False
+    )
+    assert (done.returncode, done.stderr.count("\n")) == (1, 1)
+    assert "a worker process has ended unexpectedly" in done.stderr
+    assert done.stderr.endswith("; run the same command again\n")

@@ -37,6 +37,9 @@ def metadata(setup: RunConfig, mode: str) -> dict[str, str]:
     }
 
 
+ENDED = "the run was ended"  # by the user
+
+
 def failure(text: str, diverged: bool = False) -> dict[str, str]:
     """Return further entries for a run that ended early.
 

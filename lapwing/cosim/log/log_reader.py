@@ -44,7 +44,8 @@ class LogReader:
         except IsADirectoryError:
             raise ValueError(f"{self.path}: is a folder; expected a log (MCAP)") from None
         except OSError as error:
-            raise ValueError(f"{self.path}: cannot read the log: {error.strerror}") from None
+            reason = (error.strerror or str(error)).lower()
+            raise ValueError(f"{self.path}: cannot be read: {reason}; expected a log of a flight (.mcap)") from None
         try:
             self._contents = Contents(self.path, self._file, skip_damaged)
         except BaseException:

@@ -19,6 +19,7 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.input_file import check_regular
 from lapwing.dynamics.validation import fault
 
+SCENES_HINT = "expected a scene file (.toml); `lapwing scenes` lists the shipped scenes"
 SCENE_FILE = "scene.toml"  # the scene's own text among its sources
 
 
@@ -161,7 +162,7 @@ def _read(path: Path) -> str:
         raise SceneError("", "not valid TOML: not a UTF-8 text file", source=KeyOrigin(path)) from None
     except OSError as error:
         similar = difflib.get_close_matches(path.name, [p.name for p in path.parent.glob("*.toml")], n=1)
-        hint = f"did you mean {path.parent / similar[0]}?" if similar else "`lapwing scenes` lists the shipped scenes"
+        hint = f"did you mean {path.parent / similar[0]}?" if similar else SCENES_HINT
         message = (error.strerror or "cannot be read").lower()
         raise SceneError("", f"{message}; {hint}", source=KeyOrigin(path)) from None
 

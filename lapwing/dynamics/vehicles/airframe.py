@@ -118,7 +118,8 @@ def load_airframe(path: str | Path) -> Airframe:
     try:
         return Airframe.model_validate(tomllib.loads(read_text(path)))
     except OSError as error:
-        raise ValueError(f"{path}: cannot be read: {error.strerror}") from None
+        reason = (error.strerror or str(error)).lower()
+        raise ValueError(f"{path}: cannot be read: {reason}; expected an airframe file (.toml)") from None
     except ValidationError as error:
         raise ValueError(f"{path}: {fault(error, Airframe)}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

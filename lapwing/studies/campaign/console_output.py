@@ -3,8 +3,11 @@
 import math
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import wrap
+from typing import Any
 
 import numpy as np
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 
 from lapwing.studies import json_file
@@ -17,6 +20,8 @@ from lapwing.studies.tracking import AXES, unit_and_factor
 VEHICLE_FIGURES = ("rmse.x", "rmse.y", "rmse.z", "max_distance", "touchdown.speed")
 VEHICLE_COLUMNS = ("x [m]", "y [m]", "z [m]", "farthest [m]", "touchdown [m/s]", "success")
 VEHICLES = "Worst run and success rate of each vehicle"
+# a terminal of 80 columns shows all columns
+NARROW: dict[str, Any] = {"box": SIMPLE_HEAD, "show_edge": False, "pad_edge": False, "padding": 0}
 LISTED = 10  # failures and rejected runs
 
 
@@ -76,7 +81,7 @@ def consistency_lines(results: Results) -> list[str]:
 
 
 def _vehicles(console: Console, results: Results) -> None:
-    rows = table("vehicle", *VEHICLE_COLUMNS, title=VEHICLES)
+    rows = table("vehicle", *VEHICLE_COLUMNS, title=VEHICLES, **NARROW)
     for vehicle, cells in vehicle_cells(results).items():
         rows.add_row(vehicle, *cells)
     console.print(rows)
@@ -109,8 +114,8 @@ def _list(console: Console, label: str, runs: Sequence[int], texts: Sequence[str
 
 
 def _table(console: Console, title: str, kind: str, results: Results) -> None:
-    published_heads = (results.source, "worst / published") if results.published else ()
-    rows = table("axis", "5 %", "median", "95 %", "worst", "in run", *published_heads, title=title)
+    published_heads = ("\n".join(wrap(results.source, 10)), "worst /\npublished") if results.published else ()
+    rows = table("axis", "5 %", "median", "95 %", "worst", "in run", *published_heads, title=title, **NARROW)
     for axis in AXES:
         s, (unit, scale) = results.spread(f"{kind}.{axis}"), unit_and_factor(axis)
         if s is None:

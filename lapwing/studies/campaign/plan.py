@@ -175,7 +175,8 @@ def _read_sweep(path: Path) -> tuple[dict[str, Any], ...]:
     try:
         lines = list(csv.reader(io.StringIO(read_text(path, "utf-8-sig")), skipinitialspace=True))
     except (OSError, UnicodeDecodeError) as fault:
-        raise ValueError(f"--sweep {path}: cannot be read: {getattr(fault, 'strerror', None) or fault}") from None
+        reason = (getattr(fault, "strerror", None) or str(fault)).lower()
+        raise ValueError(f"--sweep {path}: cannot be read: {reason}; expected a table of scene keys (.csv)") from None
     keys, *rows = [[cell.strip() for cell in line] for line in lines if line] or [[]]
     if len(keys) == 1 and ";" in keys[0]:
         raise ValueError(f"--sweep {path}: columns are separated by semicolons; expected commas")

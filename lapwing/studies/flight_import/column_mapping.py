@@ -112,7 +112,8 @@ def load_mapping(name: str) -> Mapping:
         try:
             text = read_text(path)
         except (OSError, UnicodeDecodeError) as error:
-            raise ValueError(f"--mapping {name}: cannot be read: {getattr(error, 'strerror', error)}") from None
+            reason = (getattr(error, "strerror", None) or str(error)).lower()
+            raise ValueError(f"--mapping {name}: cannot be read: {reason}; expected a mapping file (.toml)") from None
     try:
         mapping = Mapping.model_validate(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:

@@ -92,7 +92,8 @@ def test_command_takes_name_of_shipped_scene(tmp_path):
 
 @pytest.mark.long
 @pytest.mark.parametrize(
-    ("file", "message"), [("hovr", "unknown scene 'hovr'"), ("missing.mcap", "cannot read the log")]
+    ("file", "message"),
+    [("hovr", "unknown scene 'hovr'"), ("missing.mcap", "cannot be read: no such file or directory; expected a log")],
 )
 def test_command_rejects_missing_scene_or_log_in_one_line(file, message):
     result = lapwing("parameters", file)

@@ -3,6 +3,8 @@
 import errno
 import json
 import os
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -336,3 +338,28 @@ def test_invalid_input_is_one_line(arguments, message, tmp_path):
     assert code == 2
     assert message in " ".join(output.split())
     assert not Path("campaigns").exists()
+
+
+def run_campaign(*arguments, cwd):
+    environment = os.environ | {"PYTHONPATH": str(Path.cwd()), "COLUMNS": "80"}
+    command = [sys.executable, "-m", "lapwing", "campaign", *arguments, "--workers", "1", "--out", "c"]
+    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=280, check=False)
+
+
+def test_resumed_command_counts_all_runs(tmp_path):
+    arguments = ("hover", "--runs", "4", "--set", "run.duration=0.5")
+    assert run_campaign(*arguments, cwd=tmp_path).returncode == 0
+    sorted((tmp_path / "c/shards").glob("*.csv"))[-1].unlink()
+    done = run_campaign(*arguments, cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "c: 3 of 4 runs were done before" in done.stdout
+    assert "4 of 4 flights" in done.stdout
+
+
+def test_printed_table_fits_80_columns(tmp_path):
+    shown = run_campaign("delivery_paper", "--runs", "2", "--set", "run.duration=2", cwd=tmp_path)
+    assert shown.returncode == 0, shown.stderr
+    heading = shown.stdout.partition("Root-mean-square")[2].partition("\n\n")[0]
+    assert "published" in heading
+    assert "\u2026" not in shown.stdout
+    assert max(map(len, heading.splitlines())) <= 80

@@ -41,7 +41,7 @@ def test_single_sample_is_enough(tmp_path):
 
 @pytest.mark.parametrize(
     ("content", "complaint"),
-    [(None, "cannot read the log"), (b"no log", "not an MCAP file")],
+    [(None, "no such file"), (b"no log", "not an MCAP file")],
     ids=["missing", "foreign"],
 )
 def test_non_log_file_is_rejected(tmp_path, content, complaint):
