@@ -103,7 +103,7 @@ def _accuracy_of_log(log: Path, accuracy: bool, overrides: list[str], allow_code
     from lapwing.runs.resimulate import recorded_run
     from lapwing.studies.accuracy import flight_accuracy
 
-    if not accuracy:
+    if not accuracy and log.exists():
         raise ValueError(f"{log}: is a log; use --accuracy to measure its solver, or lapwing info")
     values = with_values({}, overrides)
     limit = values.get("solver", {}).get("accuracy")

@@ -288,6 +288,8 @@ def test_campaign_checks_values_before_slow_imports(option, value, message):
         ("check missing_scene.toml", "no such file or directory; expected a scene file (.toml); `lapwing scenes`"),
         ("campaign hover --sweep no.csv", "no.csv: cannot be read: no such file or directory; expected a table"),
         ("validate hover no.csv", "no.csv: no such file or directory; expected a recorded flight"),
+        ("check none.mcap", "none.mcap: cannot be read: no such file or directory; expected a log"),
+        ("compare none other", "none: no such file or directory; expected the folder of a campaign"),
         ("schema foo", "KIND: unknown kind of file 'foo'; expected one of airframe, gains, scene"),
         ("import flight.csv --out a.mcap --mapping m.toml", "--mapping m.toml: tme: unknown key 'tme'; did you mean"),
         ("import flight.csv --out a.mcap --mapping none.toml", "none.toml: cannot be read: no such file or directory"),

@@ -188,6 +188,8 @@ def read(path: Path) -> Folder:
         values = {name: about[name] for name in Plan._fields}
         plan = Plan(**values | {"vary": vary, "overrides": tuple(about["overrides"]), "sweep": tuple(about["sweep"])})
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
+        if not path.exists():
+            raise ValueError(f"{path}: no such file or directory; expected the folder of a campaign") from None
         raise ValueError(f"{path}: not a campaign; expected a folder with {MANIFEST}") from None
     return Folder(path, plan, about)
 
