@@ -26,7 +26,9 @@ HEIGHT_SENSORS = ("barometer", "gps", "sonar")
 _LEVELS = "1 low, 2 critical, 3 nearly empty"
 _HEIGHTS = "0 barometer, 1 GPS, 2 distance sensor, above the ground"
 NOTHING, HOLD, RETURN, LAND, DESCEND, TERMINATE = 0, 1, 2, 3, 4, 5  # failsafe actions
-_AIRMODES = "0 nothing: roll and pitch are reduced, 1 roll and pitch, 2 roll, pitch and yaw"
+_AIRMODES = (
+    "0 roll, pitch and yaw torques are reduced, 1 thrust rises to keep roll and pitch torques, 2 and that of yaw"
+)
 _ACTION = "0 warning, 1 hold, 2 return, 3 land, 4 descend (needs no position)"
 _TERMINATE = "5 terminate (stops the motors)"
 
@@ -83,17 +85,33 @@ _FLIGHT = (
     ),
 )
 _FAILSAFES = (
-    Parameter("COM_OF_LOSS_T", "s", 1.0, 0.1, 60.0, "time after which offboard setpoints are lost"),
-    Parameter("FS_OFFBOARD_ACT", "", HOLD, 0, 4, f"action on lost offboard setpoints: {_ACTION}", True),
-    Parameter("COM_DL_LOSS_T", "s", 10.0, 0.1, 300.0, "time after which a silent ground station is lost"),
+    Parameter("COM_OF_LOSS_T", "s", 1.0, 0.1, 60.0, "time without a setpoint after which offboard control is lost"),
+    Parameter("FS_OFFBOARD_ACT", "", HOLD, 0, 4, f"action if offboard control is lost: {_ACTION}", True),
     Parameter(
-        "NAV_DLL_ACT", "", RETURN, 0, 3, "action on a lost ground station: 0 warning, 1 hold, 2 return, 3 land", True
+        "COM_DL_LOSS_T", "s", 10.0, 0.1, 300.0, "time without a heartbeat after which the ground station is lost"
+    ),
+    Parameter(
+        "NAV_DLL_ACT",
+        "",
+        RETURN,
+        0,
+        3,
+        "action if the ground station is lost: 0 warning, 1 hold, 2 return, 3 land",
+        True,
     ),
     Parameter("COM_RC_IN_MODE", "", 1, 0, 6, "sticks over MAVLink: ignored by 0 (radio only) and 4 (disabled)", True),
-    Parameter("COM_RC_LOSS_T", "s", 1.0, 0.0, 35.0, "time after which sticks are lost"),
-    Parameter("NAV_RCL_ACT", "", RETURN, 0, 3, "action on lost sticks: 0 warning, 1 hold, 2 return, 3 land", True),
+    Parameter("COM_RC_LOSS_T", "s", 1.0, 0.0, 35.0, "time without stick positions after which manual control is lost"),
     Parameter(
-        "COM_RCL_EXCEPT", "", 0, 0, 31, "modes that need no sticks: 1 mission, 2 other automatic ones, 4 offboard", True
+        "NAV_RCL_ACT", "", RETURN, 0, 3, "action if manual control is lost: 0 warning, 1 hold, 2 return, 3 land", True
+    ),
+    Parameter(
+        "COM_RCL_EXCEPT",
+        "",
+        0,
+        0,
+        31,
+        "sum of the modes that fly on without sticks: 1 mission, 2 other automatic ones, 4 offboard",
+        True,
     ),
     Parameter("BAT_LOW_THR", "", 0.15, 0.0, 0.5, "charge below which the battery is low, fraction"),
     Parameter("FS_BAT_LOW_ACT", "", NOTHING, 0, 4, f"action on a low battery: {_ACTION}", True),
@@ -103,21 +121,26 @@ _FAILSAFES = (
     Parameter("FS_BAT_EMER_ACT", "", LAND, 0, 4, f"action on a nearly empty battery: {_ACTION}", True),
     Parameter("FS_MOTOR_ACT", "", LAND, 0, 5, f"action on a motor failure: {_ACTION}, {_TERMINATE}", True),
     Parameter(
-        "COM_POS_FS_DELAY", "s", 10.0, 0.1, 100.0, "time without GPS or a certain position after which it is lost"
+        "COM_POS_FS_DELAY",
+        "s",
+        10.0,
+        0.1,
+        100.0,
+        "time without GPS, or with too uncertain a position, after which the position is lost",
     ),
-    Parameter("FS_ESTIMATE_ACT", "", DESCEND, 0, 4, f"action on a lost position: {_ACTION}", True),
+    Parameter("FS_ESTIMATE_ACT", "", DESCEND, 0, 4, f"action if the position is lost: {_ACTION}", True),
     Parameter("EKF2_HGT_REF", "", GPS_HEIGHT, 0, 2, f"height reference from the start: {_HEIGHTS}", True, True),
     Parameter("SYS_FAILURE_EN", "", 1, 0, 1, "1: failures may be injected", True),
     Parameter("FD_ACT_EN", "", 1, 0, 1, "1: motor failures are detected", True),
     Parameter(
         "CA_FAILURE_MODE", "", 1, 0, 1, "0: a failed motor stays in the allocation, 1: the first one is left out", True
     ),
-    Parameter("MC_AIRMODE", "", 1, 0, 2, f"the collective rises for {_AIRMODES}", True),
+    Parameter("MC_AIRMODE", "", 1, 0, 2, f"motors at their minimum: {_AIRMODES}", True),
     Parameter("SIM_GPS_USED", "", 16, 0, 50, "satellites of the simulated GPS; below 4 it has no fix", True),
     Parameter("SYS_FAIL_BAT_LVL", "", 2, 1, 3, f"charge that a wrong battery reports: {_LEVELS}", True),
     Parameter("FS_FENCE_ACT", "", RETURN, 0, 5, f"action outside the fence: {_ACTION}, {_TERMINATE}", True),
-    Parameter("GF_MAX_HOR_DIST", "m", 0.0, 0.0, 10000.0, "horizontal distance from home of the fence; 0: none"),
-    Parameter("GF_MAX_VER_DIST", "m", 0.0, 0.0, 10000.0, "height above home of the fence; 0: none"),
+    Parameter("GF_MAX_HOR_DIST", "m", 0.0, 0.0, 10000.0, "maximum horizontal distance from home; 0: no limit"),
+    Parameter("GF_MAX_VER_DIST", "m", 0.0, 0.0, 10000.0, "maximum height above home; 0: no limit"),
 )
 _LOOPS = {
     "altitude": "PID_Z",
@@ -141,12 +164,19 @@ def _px4_axis(axis: str, stem: str, p: tuple[float, ...], d_most: float) -> list
     default, least, most, i, d, k_least = p
     return [
         Parameter(f"{name}_K", "", 1.0, k_least, 5.0, f"scale of P, I and D of the {label} rate"),
-        Parameter(f"{name}_P", "s", default, least, most, f"normalised torque over the error of the {label} rate"),
-        Parameter(f"{name}_I", "", i, 0.0, _MANY, f"normalised torque over the integral of the {label} rate's error"),
-        Parameter(f"{name}_D", "s^2", d, 0.0, d_most, f"normalised torque over the {label} acceleration"),
-        Parameter(f"{name}_FF", "s", 0.0, 0.0, _MANY, f"normalised torque over the {label} rate setpoint"),
+        Parameter(f"{name}_P", "s", default, least, most, f"gain from the {label} rate error to the normalised torque"),
         Parameter(
-            f"MC_{stem}R_INT_LIM", "", 0.3, 0.0, _MANY, f"limit of the {label} rate's integral, normalised torque"
+            f"{name}_I", "", i, 0.0, _MANY, f"gain from the integral of the {label} rate error to the normalised torque"
+        ),
+        Parameter(f"{name}_D", "s^2", d, 0.0, d_most, f"gain from the {label} acceleration to the normalised torque"),
+        Parameter(f"{name}_FF", "s", 0.0, 0.0, _MANY, f"gain from the {label} rate setpoint to the normalised torque"),
+        Parameter(
+            f"MC_{stem}R_INT_LIM",
+            "",
+            0.3,
+            0.0,
+            _MANY,
+            f"limit of the integral term of the {label} rate, normalised torque",
         ),
     ]
 
@@ -156,31 +186,45 @@ _PX4_GAINS = (
     *_px4_axis("ROLL", "R", (0.15, 0.01, 0.5, 0.2, 0.003, 0.01), 0.01),
     *_px4_axis("PITCH", "P", (0.15, 0.01, 0.6, 0.2, 0.003, 0.01), _MANY),
     *_px4_axis("YAW", "Y", (0.2, 0.0, 0.6, 0.1, 0.0, 0.0), _MANY),
-    Parameter("MC_ROLL_P", "1/s", 6.5, 0.0, 12.0, "roll rate over the error of roll"),
-    Parameter("MC_PITCH_P", "1/s", 6.5, 0.0, 12.0, "pitch rate over the error of pitch"),
-    Parameter("MC_YAW_P", "1/s", 2.8, 0.0, 5.0, "yaw rate over the error of yaw"),
-    Parameter("MC_YAW_WEIGHT", "", 0.4, 0.0, 1.0, "weight of the yaw against roll and pitch"),
+    Parameter("MC_ROLL_P", "1/s", 6.5, 0.0, 12.0, "gain from the roll error to the roll rate setpoint"),
+    Parameter("MC_PITCH_P", "1/s", 6.5, 0.0, 12.0, "gain from the pitch error to the pitch rate setpoint"),
+    Parameter("MC_YAW_P", "1/s", 2.8, 0.0, 5.0, "gain from the yaw error to the yaw rate setpoint"),
+    Parameter("MC_YAW_WEIGHT", "", 0.4, 0.0, 1.0, "weight of yaw relative to roll and pitch"),
     Parameter("MC_ROLLRATE_MAX", "deg/s", 220.0, 0.0, 1800.0, "maximum roll rate setpoint"),
     Parameter("MC_PITCHRATE_MAX", "deg/s", 220.0, 0.0, 1800.0, "maximum pitch rate setpoint"),
     Parameter("MC_YAWRATE_MAX", "deg/s", 200.0, 0.0, 1800.0, "maximum yaw rate setpoint"),
-    Parameter("MPC_XY_P", "1/s", 0.95, 0.0, 2.0, "velocity over the horizontal position error"),
-    Parameter("MPC_Z_P", "1/s", 1.0, 0.1, 1.5, "velocity over the height error"),
-    Parameter("MPC_XY_VEL_P_ACC", "1/s", 1.8, 1.2, 5.0, "acceleration over the horizontal velocity error"),
+    Parameter("MPC_XY_P", "1/s", 0.95, 0.0, 2.0, "gain from the horizontal position error to the velocity setpoint"),
+    Parameter("MPC_Z_P", "1/s", 1.0, 0.1, 1.5, "gain from the height error to the climb rate setpoint"),
+    Parameter("MPC_XY_VEL_P_ACC", "1/s", 1.8, 1.2, 5.0, "gain from the horizontal velocity error to the acceleration"),
     Parameter(
-        "MPC_XY_VEL_I_ACC", "1/s^2", 0.4, 0.0, 60.0, "acceleration over the horizontal velocity error's integral"
+        "MPC_XY_VEL_I_ACC",
+        "1/s^2",
+        0.4,
+        0.0,
+        60.0,
+        "gain from the integral of the horizontal velocity error to the acceleration",
     ),
-    Parameter("MPC_XY_VEL_D_ACC", "", 0.2, 0.1, 2.0, "acceleration over the measured horizontal acceleration"),
-    Parameter("MPC_Z_VEL_P_ACC", "1/s", 4.0, 2.0, 15.0, "acceleration over the vertical velocity error"),
-    Parameter("MPC_Z_VEL_I_ACC", "1/s^2", 2.0, 0.2, 3.0, "acceleration over the vertical velocity error's integral"),
-    Parameter("MPC_Z_VEL_D_ACC", "", 0.0, 0.0, 2.0, "acceleration over the measured vertical acceleration"),
+    Parameter(
+        "MPC_XY_VEL_D_ACC", "", 0.2, 0.1, 2.0, "gain from the measured horizontal acceleration to the acceleration"
+    ),
+    Parameter("MPC_Z_VEL_P_ACC", "1/s", 4.0, 2.0, 15.0, "gain from the vertical velocity error to the acceleration"),
+    Parameter(
+        "MPC_Z_VEL_I_ACC",
+        "1/s^2",
+        2.0,
+        0.2,
+        3.0,
+        "gain from the integral of the vertical velocity error to the acceleration",
+    ),
+    Parameter("MPC_Z_VEL_D_ACC", "", 0.0, 0.0, 2.0, "gain from the measured vertical acceleration to the acceleration"),
     Parameter("MPC_THR_MIN", "", 0.12, 0.05, 0.5, "minimum collective, fraction"),
     Parameter("MPC_THR_MAX", "", 1.0, 0.05, 1.0, "maximum collective, fraction"),
-    Parameter("MPC_THR_XY_MARG", "", 0.3, 0.0, 0.5, "collective kept for horizontal control, fraction"),
+    Parameter("MPC_THR_XY_MARG", "", 0.3, 0.0, 0.5, "collective reserved for horizontal control, fraction"),
     Parameter("MPC_THR_HOVER", "", 0.5, 0.1, 0.8, "collective in hover while MPC_USE_HTE is 0, fraction"),
     Parameter("MPC_USE_HTE", "", 1, 0, 1, "1: collective in hover from nominal weight and motors", True),
     Parameter("MPC_VELD_LP", "Hz", 5.0, 0.0, 50.0, "cut-off of the acceleration for the velocity D gains; 0: none"),
     Parameter("IMU_DGYRO_CUTOFF", "Hz", 30.0, 0.0, 1000.0, "cut-off of the acceleration for the rate D gains; 0: none"),
-    Parameter("THR_MDL_FAC", "", 0.0, 0.0, 1.0, "quadratic part of the thrust over the motor signal"),
+    Parameter("THR_MDL_FAC", "", 0.0, 0.0, 1.0, "quadratic share of the thrust as a function of the motor signal"),
 )
 
 
