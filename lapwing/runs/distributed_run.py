@@ -38,8 +38,8 @@ def monitor_run(
     setup, peers, key_prefix = spec.setup, spec.peers, spec.key_prefix
     check_key_prefix(key_prefix)
     external = spec.external or {}
-    clock, participants = Clock(observer, setup), PublisherIds(key_prefix, external=tuple(external))
     names = set(process_table.required_processes(setup, external))
+    clock, participants = Clock(observer, setup, names), PublisherIds(key_prefix, external=tuple(external))
     listen, connect = mesh(MONITOR, peers)
     gid, security = participants.gid(MONITOR), settings(setup, MONITOR, key_prefix, spec.keys)
     with Stop() as stop, ZenohBus(listen, connect, gid=gid, security=security) as bus:

@@ -1,5 +1,6 @@
 """Run with every service in a separate process."""
 
+import time
 from collections.abc import Callable, Iterable
 from contextlib import nullcontext
 from typing import IO
@@ -18,6 +19,8 @@ from lapwing.runs.compile_notice import Compilation
 from lapwing.runs.observer import Elapsed, Observer
 from lapwing.services import process_table
 from lapwing.services.process_main import ProcessSpec, write_spec
+
+NOTICE = 5.0  # [s] after which participants that are started elsewhere and have not joined are named
 
 
 def fly_processes(
@@ -43,8 +46,8 @@ def fly_processes(
     """
     check_key_prefix(spec.key_prefix)
     setup, spec = spec.setup, spec._replace(secret=new_secret())
-    clock = Clock(observer, setup)
     external = spec.external or {}
+    clock = Clock(observer, setup, external)
     names = [*process_table.required_processes(setup, external), *([process_table.ROUTER] if spec.open else [])]
     claim = core_of_services(setup)
 
@@ -76,9 +79,16 @@ def fly_processes(
 
 
 class Clock:
-    """Progress of a run for its observer, measured from the first to the last log packet."""
+    """Progress of a run for its observer, measured from the first to the last log packet.
 
-    def __init__(self, observer: Observer, setup: RunConfig):
+    Args:
+        observer: shows the progress.
+        setup: run configuration.
+        elsewhere: names of participants that somebody else starts.
+    """
+
+    def __init__(self, observer: Observer, setup: RunConfig, elsewhere: Iterable[str] = ()):
+        self._elsewhere, self._created = set(elsewhere), time.monotonic()
         self._observer, self._started, self._slow_disk = observer, False, False
         self._pose, self._status = primary_topic(setup, POSE), primary_topic(setup, STATUS)
         self._compilation: Compilation | None = Compilation.of(setup)  # None after it was shown
@@ -91,6 +101,10 @@ class Clock:
             if watch.compiling and self._compilation:
                 self._observer.compiling(self._compilation)
                 self._compilation = None
+            absent = self._elsewhere - watch.present
+            if absent and time.monotonic() - self._created > NOTICE:
+                self._observer.say(f"waiting for {', '.join(sorted(absent))} to join")
+                self._elsewhere = set()
             return False
         if not self._started:
             self._started = True

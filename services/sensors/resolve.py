@@ -3,6 +3,7 @@
 import math
 import sys
 from collections.abc import Mapping
+from types import ModuleType
 from typing import Any
 
 import numba
@@ -106,7 +107,7 @@ def fleet(
 
 def _with_others(config: ServiceConfig, bodies: Mapping[str, VisibleBody]) -> ServiceConfig:
     setup: SensorsSetup = config.parameters
-    seeing = [hasattr(sys.modules[type(i.sensor).__module__], "SEES_VEHICLES") for i in setup.instruments]
+    seeing = [_sees_vehicles(sys.modules[type(i.sensor).__module__]) for i in setup.instruments]
     if not bodies or not any(seeing):
         return config
     instruments, outputs = [], []
@@ -117,6 +118,10 @@ def _with_others(config: ServiceConfig, bodies: Mapping[str, VisibleBody]) -> Se
         outputs.append(port)
     inputs = (*config.inputs, *(InputPort(neighbour_port(other, ports.TRUTH)) for other in bodies))
     return ServiceConfig(setup._replace(instruments=tuple(instruments)), inputs, tuple(outputs))
+
+
+def _sees_vehicles(module: ModuleType) -> bool:
+    return bool(getattr(module, "SEES_VEHICLES", False))
 
 
 def reseed(config: ServiceConfig, seed: int, vehicle: str) -> ServiceConfig:
@@ -146,7 +151,7 @@ def trial_reading(name: str, table: Mapping[str, Any], p: Any) -> Any:
     """
     module, where = module_of(name, table), f"sensors.{name}.module"
     key, truth = stream_key(0, "trial", name), Truth()
-    if hasattr(module, "SEES_VEHICLES"):
+    if _sees_vehicles(module):
         truth = truth._replace(others=(OtherVehicle(ZERO, NO_ROTATION, VisibleBody(0.0, 0.0, 1.0, 0.0, 1.0)),))
     try:
         state = module.initial(p, key, truth)

@@ -2,6 +2,7 @@
 
 import json
 import os
+import signal
 import stat
 import subprocess
 import sys
@@ -158,6 +159,17 @@ def test_external_service_with_other_configuration_is_rejected(tmp_path):
     assert output.startswith("lapwing: autopilot_messages: last_tick is ")
     assert "2250 in autopilot; start all services from the same scene" in output
     assert output.count("\n") == 1
+
+
+@pytest.mark.long
+def test_run_says_that_it_waits_for_external_service(tmp_path):
+    with private_endpoints(["autopilot"]) as ends:
+        run = fly(tmp_path, "--external", f"autopilot={ends['autopilot']}")
+        while "waiting for autopilot to join" not in (line := run.stdout.readline()):
+            assert line, run.communicate()
+        run.send_signal(signal.SIGINT)
+        run.communicate(timeout=120)
+    assert run.returncode == 130
 
 
 def test_early_end_of_external_service_fails_run(tmp_path):

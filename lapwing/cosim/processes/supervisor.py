@@ -203,7 +203,7 @@ class RunSupervisor:
         return RunFailed(f"{', '.join(sorted(self._stopped_since))}: stopped for {STALL:g} s, {self._at()}")
 
     def _unexpected_end(self, name: str, code: int) -> RunFailed:
-        output = self._children[name].last_line()
+        output = self._children[name].last_line().replace(f": {name}: ", ": ", 1)  # its own messages name it, too
         killed = code == -signal.SIGKILL and out_of_memory.kills() > self._killed_before
         memory = "; the system killed it for lack of memory" if killed else ""
         return RunFailed(f"{name} ended unexpectedly ({reason(code)}) {self._at()}{output}{memory}")

@@ -49,6 +49,7 @@ class Run:
         own = [name for name in [*NAMES, "mavlink"] if name not in external]
         self.processes = {name: Process() for name in own}
         children = {name: Child(process, io.BytesIO(b"lapwing: cause\n")) for name, process in self.processes.items()}
+        self.children = children
         clock, stopped = (lambda: self.now), (lambda process: process.stopped)
         self.supervisor = RunSupervisor(self.monitor, children, NAMES, external, clock, stopped)
 
@@ -116,6 +117,13 @@ def test_unexpected_exit_is_named_with_reason(run, code, reason):
     run.start().exit("sensors", code=code)
     run.exit("plant", code=ExitCode.CUT_SHORT)
     with fails(f"sensors ended unexpectedly ({reason}) at t = 0.000 s: cause"):
+        run.update()
+
+
+def test_fault_of_service_is_named_once(run):
+    run.children["sensors"].output.write(b"lapwing: sensors: no terrain\n")
+    run.start().exit("sensors", code=ExitCode.FAILED)
+    with fails("sensors ended unexpectedly (exit code 1) at t = 0.000 s: no terrain"):
         run.update()
 
 
