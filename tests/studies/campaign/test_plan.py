@@ -161,7 +161,7 @@ def test_rejection_text_is_independent_of_folder():
         ({"design": "halton"}, "design halton: expected one of random, lhs, sobol, grid"),
         ({"design": "lhs"}, "design lhs: expected a key that varies"),
         ({"design": "grid", "vary": {"a": uniform(0, 1)}}, r"design grid: expected a key that varies by choice"),
-        ({"sweep": "none.csv"}, "--sweep none.csv: cannot be read: No such file"),
+        ({"sweep": "none.csv"}, "--sweep none.csv: cannot be read: no such file"),
     ],
 )
 def test_invalid_plan_is_rejected(arguments, message):
