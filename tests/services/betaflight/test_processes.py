@@ -87,7 +87,7 @@ def test_stalled_firmware_is_reported_and_log_readable(tmp_path):
         done = lapwing("run", "betaflight_quad", "--log", log, "--set", "run.duration=20",
                        *options(first, step_timeout=4.0))  # fmt: skip
     assert done.returncode == 1
-    assert "betaflight: no motor outputs for 4 s at t = " in done.stderr
+    assert ": no motor outputs for 4 s at t = " in done.stderr
     assert len(Flight.read(log).truth) > 10
 
 

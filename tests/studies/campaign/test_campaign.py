@@ -150,7 +150,7 @@ def test_shard_option_flies_part_of_runs(complete, tmp_path):
     assert f"run 0 of {tmp_path / 'c'}: not recorded in the campaign yet" in reported[0]
     assert f"run 1 of {tmp_path / 'c'}: final state bit-for-bit identical" in reported[1]
     code, output = run_lapwing(*arguments)
-    assert (code, "3 of 3 flights" in output) == (0, True)
+    assert (code, "5 of 5 flights" in output) == (0, True)
 
 
 def test_worker_with_different_results_is_rejected(complete):
@@ -177,7 +177,7 @@ def test_full_disk_is_one_line_and_keeps_shards(tmp_path, monkeypatch):
     assert (code, expected in output, len(read(tmp_path / "c").missing())) == (1, True, 3)
     monkeypatch.undo()
     code, output = run_lapwing(*arguments)
-    assert (code, "3 of 3 flights" in output) == (0, True)
+    assert (code, "5 of 5 flights" in output) == (0, True)
 
 
 def test_end_at_interval_width_is_independent_of_workers(tmp_path):
