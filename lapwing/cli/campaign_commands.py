@@ -218,9 +218,9 @@ def _fly(
     from lapwing.studies.campaign.shard_loop import campaign as study
 
     start, previous = time.monotonic(), -1
-    own_shards = [k for k in range(len(folder.shards)) if part is None or k in part]
-    own_runs = sum(len(folder.shards[k]) for k in own_shards)
-    before = own_runs - sum(len(folder.shards[k]) for k in folder.missing() if k in own_shards)  # recorded earlier
+    runs = {k: len(shard) for k, shard in enumerate(folder.shards) if part is None or k in part}  # by own shard
+    own_runs = sum(runs.values())
+    before = own_runs - sum(runs.get(k, 0) for k in folder.missing())  # recorded earlier
     if before:
         screen.print(f"{folder.path}: {before} of {own_runs} runs were done before", soft_wrap=True)
     with StudyProgress(screen, "flights", parallel, LINES, until is not None, before) as progress:

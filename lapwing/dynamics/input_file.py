@@ -10,6 +10,12 @@ def check_regular(path: Path) -> None:
         raise OSError(errno.EINVAL, "is not a regular file", str(path))
 
 
+def unreadable(subject: str | Path, error: OSError | UnicodeDecodeError, expected: str) -> ValueError:
+    """Return the error of an input file that cannot be read: its name or option, the reason, and the expected kind."""
+    reason = (getattr(error, "strerror", None) or str(error)).lower()
+    return ValueError(f"{subject}: cannot be read: {reason}; expected {expected}")
+
+
 def read_bytes(path: Path) -> bytes:
     """Return the content of a regular file. Raise OSError if it cannot be read."""
     check_regular(path)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 
 from lapwing.dynamics.environment import STANDARD
 from lapwing.dynamics.geodesy import Home, geodetic_to_enu
-from lapwing.dynamics.input_file import read_text
+from lapwing.dynamics.input_file import read_text, unreadable
 from lapwing.messages import MissionItem, OperatorCommand, Vector3
 
 OPERATED = ["autopilot.accept_commands=true", "autopilot.follow_trajectory=false"]  # scene overrides for flying a plan
@@ -62,8 +62,7 @@ def read(path: Path, standing_height: float = 0.0, home: Home = STANDARD.home) -
     try:
         text = read_text(path)
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise ValueError(f"{path}: cannot be read: {reason}; expected a mission file (.plan, .waypoints)") from None
+        raise unreadable(path, error, "a mission file (.plan, .waypoints)") from None
     except UnicodeDecodeError:
         raise ValueError(f"{path}: not a UTF-8 text file; expected a .plan or .waypoints file") from None
     return parse(path, text, standing_height, home)

@@ -12,7 +12,7 @@ from lapwing.cosim.config.former_names import present_metadata
 from lapwing.cosim.config.provenance import package_version
 from lapwing.cosim.log.mcap_contents import Contents
 from lapwing.cosim.log.mcap_writer import DETERMINISTIC
-from lapwing.dynamics.input_file import check_regular
+from lapwing.dynamics.input_file import check_regular, unreadable
 from lapwing.messages import message_class
 from lapwing.messages.digest import Digest
 from lapwing.messages.topic_columns import ColumnBuilder, TopicColumns
@@ -44,8 +44,7 @@ class LogReader:
         except IsADirectoryError:
             raise ValueError(f"{self.path}: is a folder; expected a log (MCAP)") from None
         except OSError as error:
-            reason = (error.strerror or str(error)).lower()
-            raise ValueError(f"{self.path}: cannot be read: {reason}; expected a log of a flight (.mcap)") from None
+            raise unreadable(self.path, error, "a log of a flight (.mcap)") from None
         try:
             self._contents = Contents(self.path, self._file, skip_damaged)
         except BaseException:

@@ -9,7 +9,7 @@ from pydantic import ValidationError, model_validator
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._types import steiner
-from lapwing.dynamics.input_file import read_text
+from lapwing.dynamics.input_file import read_text, unreadable
 from lapwing.dynamics.validation import fault
 from lapwing.dynamics.vehicles.airframe_tables import (
     Battery,
@@ -118,8 +118,7 @@ def load_airframe(path: str | Path) -> Airframe:
     try:
         return Airframe.model_validate(tomllib.loads(read_text(path)))
     except OSError as error:
-        reason = (error.strerror or str(error)).lower()
-        raise ValueError(f"{path}: cannot be read: {reason}; expected an airframe file (.toml)") from None
+        raise unreadable(path, error, "an airframe file (.toml)") from None
     except ValidationError as error:
         raise ValueError(f"{path}: {fault(error, Airframe)}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lapwing.cosim.scene.overrides import value_of
-from lapwing.dynamics.input_file import read_text
+from lapwing.dynamics.input_file import read_text, unreadable
 from lapwing.studies.campaign.distributions import Distribution
 
 SEED_STRIDE = 2**32  # between the seeds of two campaigns
@@ -175,8 +175,7 @@ def _read_sweep(path: Path) -> tuple[dict[str, Any], ...]:
     try:
         lines = list(csv.reader(io.StringIO(read_text(path, "utf-8-sig")), skipinitialspace=True))
     except (OSError, UnicodeDecodeError) as fault:
-        reason = (getattr(fault, "strerror", None) or str(fault)).lower()
-        raise ValueError(f"--sweep {path}: cannot be read: {reason}; expected a table of scene keys (.csv)") from None
+        raise unreadable(f"--sweep {path}", fault, "a table of scene keys (.csv)") from None
     keys, *rows = [[cell.strip() for cell in line] for line in lines if line] or [[]]
     if len(keys) == 1 and ";" in keys[0]:
         raise ValueError(f"--sweep {path}: columns are separated by semicolons; expected commas")

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
-from lapwing.dynamics.input_file import read_text
+from lapwing.dynamics.input_file import read_text, unreadable
 from lapwing.dynamics.validation import fault
 
 GRAVITY = 9.80665  # [m/s^2]
@@ -112,8 +112,7 @@ def load_mapping(name: str) -> Mapping:
         try:
             text = read_text(path)
         except (OSError, UnicodeDecodeError) as error:
-            reason = (getattr(error, "strerror", None) or str(error)).lower()
-            raise ValueError(f"--mapping {name}: cannot be read: {reason}; expected a mapping file (.toml)") from None
+            raise unreadable(f"--mapping {name}", error, "a mapping file (.toml)") from None
     try:
         mapping = Mapping.model_validate(tomllib.loads(text))
     except tomllib.TOMLDecodeError as error:

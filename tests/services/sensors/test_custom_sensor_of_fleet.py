@@ -37,7 +37,7 @@ def test_sensor_measures_distance_to_nearest_vehicle(tmp_path):
 
 
 @pytest.mark.long
-def test_sensor_of_fleets_sees_nothing_alone(tmp_path):
+def test_sensor_detects_no_vehicle_in_scene_of_one_vehicle(tmp_path):
     done = run(tmp_path, "hover")
     assert done.returncode == 0, done.stderr
     reading = lapwing.read_log(tmp_path / "flight.mcap").topic("custom_sensor/proximity")["values"]
