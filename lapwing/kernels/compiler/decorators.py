@@ -17,8 +17,8 @@ if numba_versions.is_supported():
     from lapwing.kernels.compiler.pipeline import KernelDispatcher as _Dispatcher
     from lapwing.kernels.compiler.pipeline import PipelineCache as _Cache
 else:
-    from lapwing.kernels.compiler.plain_dispatcher import PlainCache as _Cache  # type: ignore[assignment]
-    from lapwing.kernels.compiler.plain_dispatcher import PlainDispatcher as _Dispatcher  # type: ignore[assignment]
+    from lapwing.kernels.compiler.numba_versions import PlainCache as _Cache  # type: ignore[assignment]
+    from lapwing.kernels.compiler.numba_versions import PlainDispatcher as _Dispatcher  # type: ignore[assignment]
 
 F = TypeVar("F", bound=Callable[..., Any])
 
