@@ -8,6 +8,7 @@ from latex2mathml.converter import convert
 
 _DISPLAYED = re.compile(r"^\$\$(.*?)\$\$[ \t]*(?:\n\*\*\([^)]+\)\*\*$)?", re.DOTALL | re.MULTILINE)
 _TAG = re.compile(r"\\tag\{([^}]*)\}")
+_UNKNOWN = re.compile(r"\\|&(?!#?\w+;)")  # left in the text of an equation
 _EQUATION = re.compile(r'<(span|div) class="arithmatex">\\([(\[])(.*?)\\[)\]]</\1>', re.DOTALL)
 
 
@@ -26,6 +27,8 @@ def _mathml(match: re.Match[str]) -> str:
     latex = html.unescape(latex)
     number = _TAG.search(latex)
     equation = convert(_TAG.sub("", latex), display="block" if opening == "[" else "inline")
+    if _UNKNOWN.search(re.sub(r"<[^>]*>", "", equation)):
+        raise ValueError(f"the converter does not know a command of this equation: {latex}")
     right = f'<span style="float:right">({number[1]})</span>' if number else ""
     style = ' style="margin:1em 0;overflow:auto"' if tag == "div" else ""
     return f"<{tag}{style}>{right}{equation}</{tag}>"

@@ -1,6 +1,6 @@
 """The International Standard Atmosphere up to 20 km, optionally with another sea-level pressure or temperature.
 
-ISO 2533:1975; theory.md, eqs. (2.3) and (3.8).
+ISO 2533:1975; theory, eqs. (2.3) and (3.8).
 """
 
 from typing import Annotated, NamedTuple
@@ -94,7 +94,7 @@ def pressure_altitude(a, pressure_now):
 
 @always_inline
 def share_of_squares(shares, velocity_body):
-    """Return a static pressure position error over half the density [m^2/s^2] (theory.md, eq. (3.65)).
+    """Return a static pressure position error over half the density [m^2/s^2] (theory, eq. (3.65)).
 
     Args:
         shares: of the dynamic pressure, in flight forwards, backwards, to the right, to the left and vertically.

@@ -1,6 +1,6 @@
 """Conversions between ENU about a home point and WGS 84.
 
-WGS 84: NIMA TR8350.2. Conversions: theory.md, eqs. (3.4) to (3.7).
+WGS 84: NIMA TR8350.2. Conversions: theory, eqs. (3.4) to (3.7).
 """
 
 from typing import Annotated, NamedTuple
@@ -26,7 +26,7 @@ class Home(NamedTuple):
 
 @always_inline
 def geodetic_to_ecef(latitude_deg, longitude_deg, height):
-    """Return the Earth-centred, Earth-fixed coordinates [m] of a point (theory.md, eq. (3.4))."""
+    """Return the Earth-centred, Earth-fixed coordinates [m] of a point (theory, eq. (3.4))."""
     latitude, longitude = math.radians(latitude_deg), math.radians(longitude_deg)
     s, c = math.sincos(latitude)
     n = SEMI_MAJOR / math.sqrt(1.0 - _E2 * s * s)
@@ -39,7 +39,7 @@ def geodetic_to_ecef(latitude_deg, longitude_deg, height):
 
 @always_inline
 def ecef_to_geodetic(r):
-    """Return latitude [deg], longitude [deg], height [m] of a point near the Earth's surface (theory.md, eq. (3.5))."""
+    """Return latitude [deg], longitude [deg], height [m] of a point near the Earth's surface (theory, eq. (3.5))."""
     rho = math.hypot(r[0], r[1])
     # Bowring's iteration on the reduced latitude: up to 20 km, the second pass changes less than one rounding.
     tangent_s, tangent_c = r[2] * SEMI_MAJOR, rho * _SEMI_MINOR
@@ -62,7 +62,7 @@ def _axes(home):
 
 @kernel
 def enu_to_geodetic(home, position_world):
-    """Return latitude [deg], longitude [deg], height [m] of a point of the world frame (theory.md, eq. (3.6))."""
+    """Return latitude [deg], longitude [deg], height [m] of a point of the world frame (theory, eq. (3.6))."""
     sp, cp, sl, cl = _axes(home)
     e, n, u = position_world
     o = geodetic_to_ecef(home.latitude_deg, home.longitude_deg, home.height)
@@ -82,6 +82,6 @@ def geodetic_to_enu(home, latitude_deg, longitude_deg, height):
 
 
 def normal_gravity(latitude_deg: float) -> float:
-    """Return gravity [m/s^2] on the ellipsoid (theory.md, eq. (2.29)); NIMA TR8350.2, eq. (4-1)."""
+    """Return gravity [m/s^2] on the ellipsoid (theory, eq. (2.29)); NIMA TR8350.2, eq. (4-1)."""
     square = math.square(math.sin(math.radians(latitude_deg)))
     return 9.7803253359 * (1.0 + 0.00193185265241 * square) / math.sqrt(1.0 - _E2 * square)

@@ -3,7 +3,7 @@
 Philox 4x32-10 of Salmon, Moraes, Dror and Shaw, "Parallel random numbers: as easy as 1, 2, 3", SC'11. Normal draws
 invert the distribution function by Wichura's algorithm AS 241 (PPND16, Applied Statistics 37(3) 1988, 477-484).
 Only +, -, *, / and square roots are used, whose rounding IEEE 754 determines: bit-for-bit identical results on every
-machine and in every mode of a run, with any mathematics library (theory.md, section 3.1).
+machine and in every mode of a run, with any mathematics library (theory, section 3.1).
 """
 
 import hashlib

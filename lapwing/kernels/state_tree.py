@@ -23,7 +23,7 @@ from lapwing.kernels.codegen import compile_source, generic
 class Manifold(NamedTuple):
     """Operations of a manifold leaf class: compiled functions, u and v in its tangent coordinates.
 
-    The tangent space at every point is one Lie algebra that acts on the manifold (theory.md, section 5.1).
+    The tangent space at every point is one Lie algebra that acts on the manifold (theory, section 5.1).
     """
 
     retract: Callable  # (x, v) -> the point that the exponential of v takes x to
@@ -180,7 +180,7 @@ axpy = _operation(
 scale = _operation("scale(a, v)", "v", _of_numbers(("v",), "a * {0}"), "Return a v for a scalar a and a tangent v.")
 rounding_error = _operation(
     "rounding_error(x, v, s)", "x", _of_numbers(("x", "v", "s"), "({0} - ({2} - ({2} - {0}))) + ({1} - ({2} - {0}))"),
-    "Return the error x + v - s of the rounded sum s of two trees, exactly (theory.md, eq. (2.79)).",
+    "Return the error x + v - s of the rounded sum s of two trees, exactly (theory, eq. (2.79)).",
 )  # fmt: skip
 flatten = _operation("flatten(x)", "x", _flatten, "Return every stored number of a state or tangent as one flat tuple.")
 largest = _operation("largest(v)", "v", _largest, "Return the largest absolute number of a state or tangent.")

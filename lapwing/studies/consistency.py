@@ -1,4 +1,4 @@
-"""Consistency of an estimate: normalised errors and innovations squared (theory.md, eqs. (3.46) and (3.47)).
+"""Consistency of an estimate: normalised errors and innovations squared (theory, eqs. (3.46) and (3.47)).
 
 Source: Bar-Shalom, Li and Kirubarajan, "Estimation with Applications to Tracking and Navigation", Wiley 2001, 5.4.
 """

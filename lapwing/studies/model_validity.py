@@ -54,7 +54,7 @@ def _unlimited_current(truth: TopicView, scene: dict[str, Any]) -> list[Validity
 
 
 def winding_current(truth: TopicView, motor: dict[str, Any]) -> np.ndarray:
-    """Return the current [A] of each motor by voltage and back-EMF, shape (n, motors) (theory.md, eq. (2.9)).
+    """Return the current [A] of each motor by voltage and back-EMF, shape (n, motors) (theory, eq. (2.9)).
 
     Args:
         truth: true state, n messages.

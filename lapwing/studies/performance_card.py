@@ -1,4 +1,4 @@
-"""Performance card of a vehicle: computed from its models, next to published values (theory.md, chapter 2)."""
+"""Performance card of a vehicle: computed from its models, next to published values (theory, chapter 2)."""
 
 import math
 import tomllib
@@ -35,7 +35,7 @@ class Row(NamedTuple):
 
 
 def thrust_over_weight_without_a_rotor(airframe: Airframe, rotor: performance.Rotor) -> float:
-    """Return the performance after the worst rotor loss, by the allocation in hover (theory.md, eq. (4.27)).
+    """Return the performance after the worst rotor loss, by the allocation in hover (theory, eq. (4.27)).
 
     Raises:
         ValueError: the rotors cannot lose one.

@@ -21,7 +21,7 @@ class Push(NamedTuple):
 
 
 def tension(position: np.ndarray, velocity: np.ndarray, force: np.ndarray, load: Mapping[str, Any]) -> np.ndarray:
-    """Return the tension of k links [N], negative where they push (theory.md, eq. (7.28)), shape (n, k).
+    """Return the tension of k links [N], negative where they push (theory, eq. (7.28)), shape (n, k).
 
     Args:
         position: positions of the load and the quadrotors [m], world, shape (n, 1 + k, 3).

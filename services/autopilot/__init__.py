@@ -1,1 +1,1 @@
-"""The autopilot service: estimator, controller and commander (theory.md, section 4)."""
+"""The autopilot service: estimator, controller and commander (theory, section 4)."""

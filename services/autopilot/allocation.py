@@ -1,4 +1,4 @@
-"""Control allocation for arbitrary rotor positions (theory.md, eq. (4.27)).
+"""Control allocation for arbitrary rotor positions (theory, eq. (4.27)).
 
 The least-squares thrusts of the desired lift and torques: the pseudo-inverse of the effectiveness matrix, scaled so
 that four rotors in a cross get shares of +1 and -1. Thrusts are those of isolated rotors; the effectiveness matrix
@@ -34,7 +34,7 @@ def effectiveness(rotor_x: PerRotor, rotor_y: PerRotor, rotor_yaw: PerRotor) -> 
 
 
 def tilted_effectiveness(positions: tuple[Vec3, ...], axes: tuple[Vec3, ...], rotor_reaction: PerRotor) -> np.ndarray:
-    """Return the effectiveness of tilted rotors, shape (4, rotors) (theory.md, eq. (4.27a)).
+    """Return the effectiveness of tilted rotors, shape (4, rotors) (theory, eq. (4.27a)).
 
     Args:
         positions: [m] body.
@@ -49,7 +49,7 @@ def tilted_effectiveness(positions: tuple[Vec3, ...], axes: tuple[Vec3, ...], ro
 def wake_effectiveness(
     thrust_only: np.ndarray, reaction: np.ndarray, torque_per_thrust: float, wakes: WakeSlopes
 ) -> np.ndarray:
-    """Return the effectiveness of rotors in the wakes of others, shape (4, rotors) (theory.md, eq. (4.27b)).
+    """Return the effectiveness of rotors in the wakes of others, shape (4, rotors) (theory, eq. (4.27b)).
 
     Args:
         thrust_only: `effectiveness` of the rotors without reaction torques, shape (4, rotors).

@@ -1,4 +1,4 @@
-"""Smoothed angle reference of the inner loop with rate and acceleration (theory.md, eqs. (4.14)-(4.16))."""
+"""Smoothed angle reference of the inner loop with rate and acceleration (theory, eqs. (4.14)-(4.16))."""
 
 from typing import NamedTuple
 

@@ -13,7 +13,7 @@ def wrap(angle: float) -> float:
 
 @always_inline
 def angle_rates(roll: float, pitch: float, omega_body: Vec3) -> Vec3:
-    """Return the rates of roll, pitch and yaw [rad/s] from body rates (theory.md, eq. (4.17)); singular at +-pi/2."""
+    """Return the rates of roll, pitch and yaw [rad/s] from body rates (theory, eq. (4.17)); singular at +-pi/2."""
     s, c = math.sincos(roll)
     turn = (s * omega_body[1] + c * omega_body[2]) / math.cos(pitch)
     return (omega_body[0] + math.sin(pitch) * turn, c * omega_body[1] - s * omega_body[2], turn)
@@ -41,7 +41,7 @@ def error_on_so3(
 ) -> tuple[Vec3, Vec3]:
     """Return the rotation vector [rad] in body axes from the attitude to the reference and its rate [rad/s].
 
-    Free of singularities (theory.md, eq. (4.18)).
+    Free of singularities (theory, eq. (4.18)).
     """
     reference = from_roll_pitch_yaw(angles_reference[0], angles_reference[1], angles_reference[2])
     between = multiply(conjugate(attitude), reference)

@@ -1,4 +1,4 @@
-"""Cascaded PID controller with saturation, from setpoint to motor voltages (theory.md, section 4.2)."""
+"""Cascaded PID controller with saturation, from setpoint to motor voltages (theory, section 4.2)."""
 
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -86,7 +86,7 @@ def sign(x: float) -> float:
 
 @always_inline
 def to_heading(yaw: float, v_world: Sequence[float]) -> tuple[float, float]:
-    """Return the components of a world vector along the heading and to its left (theory.md, eq. (4.11))."""
+    """Return the components of a world vector along the heading and to its left (theory, eq. (4.11))."""
     s, c = math.sincos(yaw)
     return (c * v_world[0] + s * v_world[1], c * v_world[1] - s * v_world[0])
 
@@ -95,7 +95,7 @@ def to_heading(yaw: float, v_world: Sequence[float]) -> tuple[float, float]:
 def tilt_targets(
     p: Parameters, yaw: float, integral: Vec3, error: Vec3, error_rate: Vec3, acceleration_world: Vec3
 ) -> tuple[float, float]:
-    """Return the outer loops' tilts [rad] towards the heading and to its left (theory.md, eq. (4.12)).
+    """Return the outer loops' tilts [rad] towards the heading and to its left (theory, eq. (4.12)).
 
     `error` is that of the position [m], `integral` [m s] and `error_rate` [m/s] belong to it; all in world axes.
     """
@@ -113,7 +113,7 @@ def tilt_targets(
 def collective_control(
     p: Parameters, integral: float, error: float, error_rate: float, acceleration: float, roll: float, pitch: float
 ) -> float:
-    """Return the lift [N] of every rotor, with feed-forward of weight and tilt (theory.md, eq. (4.13)).
+    """Return the lift [N] of every rotor, with feed-forward of weight and tilt (theory, eq. (4.13)).
 
     `error` is that of the height [m]; `roll` and `pitch` are those of the estimate [rad].
     """

@@ -1,4 +1,4 @@
-"""Vote between two or three inertial measurement units (theory.md, section 3.4).
+"""Vote between two or three inertial measurement units (theory, section 3.4).
 
 A reading is good if it is valid, is not stuck, and agrees with the median of the good ones where three units are left.
 With two units only missing and stuck readings are detected: a disagreement does not identify the wrong unit.

@@ -1,4 +1,4 @@
-"""Land detector: take-off, landing and motor cut-off (theory.md, section 4.5)."""
+"""Land detector: take-off, landing and motor cut-off (theory, section 4.5)."""
 
 from typing import NamedTuple
 

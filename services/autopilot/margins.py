@@ -1,4 +1,4 @@
-"""Stability margins of the control loops about hover (theory.md, eqs. (4.30)-(4.34))."""
+"""Stability margins of the control loops about hover (theory, eqs. (4.30)-(4.34))."""
 
 from typing import Any, NamedTuple
 

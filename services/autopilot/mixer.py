@@ -1,4 +1,4 @@
-"""Mixer: virtual controls to rotor thrusts with prioritised saturation (theory.md, eqs. (4.20)-(4.23), (4.28))."""
+"""Mixer: virtual controls to rotor thrusts with prioritised saturation (theory, eqs. (4.20)-(4.23), (4.28))."""
 
 import math
 from collections.abc import Mapping
@@ -89,7 +89,7 @@ def _feasible_yaw(shares: Shares, roll: float, pitch: float, yaw: float, thrust_
 
 @always_inline
 def saturate(shares: Shares, q: VirtualControls, thrust_max: float, airmode: int) -> VirtualControls:
-    """Return the nearest virtual controls with thrusts of 0..thrust_max [N] (theory.md, eqs. (4.21)-(4.23)).
+    """Return the nearest virtual controls with thrusts of 0..thrust_max [N] (theory, eqs. (4.21)-(4.23)).
 
     Priority: roll and pitch, then collective, then yaw within the remaining range. Failed rotors, which have no share
     of the collective, are ignored.

@@ -1,4 +1,4 @@
-"""Inverse static motor model, from thrust to voltage (theory.md, eq. (4.24))."""
+"""Inverse static motor model, from thrust to voltage (theory, eq. (4.24))."""
 
 import math
 from typing import NamedTuple

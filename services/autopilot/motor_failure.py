@@ -1,4 +1,4 @@
-"""Detector of rotors with a loss of thrust, from gyroscope readings (theory.md, eqs. (4.25)-(4.26)).
+"""Detector of rotors with a loss of thrust, from gyroscope readings (theory, eqs. (4.25)-(4.26)).
 
 An observer estimates the angular acceleration about body x and y that the commands do not explain. A weak rotor
 causes one along its own arm. ArduPilot's thrust-loss check detects the same failure by saturation.

@@ -1,4 +1,4 @@
-"""PID loop with anti-windup (theory.md, eq. (4.10))."""
+"""PID loop with anti-windup (theory, eq. (4.10))."""
 
 from typing import NamedTuple
 

@@ -115,7 +115,7 @@ class Autopilot(FirmwareKeys):
 
 
 def _check_motor_limits(scene: Scene, known: Airframe) -> None:
-    """Check current, power and voltage of a motor in hover if `dc_motor` is active (theory.md, eq. (2.9)).
+    """Check current, power and voltage of a motor in hover if `dc_motor` is active (theory, eq. (2.9)).
 
     Raises:
         ConfigError: a limit is exceeded.

@@ -31,7 +31,7 @@ def of_array(key: str, path: Path) -> np.ndarray:
 
 
 def of_geotiff(key: str, path: Path, home: Home, points: int, spacing: float) -> np.ndarray:
-    """Return the heights of a GeoTIFF on a square about home by cubic convolution (theory.md, section 2.9).
+    """Return the heights of a GeoTIFF on a square about home by cubic convolution (theory, section 2.9).
 
     Args:
         key: scene key of the file, for messages.

@@ -38,7 +38,7 @@ def title(scene: Path) -> str:
 
 
 class CooperativeLoad(SceneTable):
-    """Quadrotors that carry a point mass by rigid links (theory.md, section 7.4); tuples have an entry for each."""
+    """Quadrotors that carry a point mass by rigid links (theory, section 7.4); tuples have an entry for each."""
 
     TABLE: ClassVar[str] = "cooperative_load"
     OPTIONAL: ClassVar[bool] = True

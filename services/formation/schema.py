@@ -10,7 +10,7 @@ from lapwing.services.common.run_schema import CooperativeLoad, Triple
 
 
 class Formation(SceneTable):
-    """Control of load position, link directions and attitudes (theory.md, eqs. (7.22) to (7.27))."""
+    """Control of load position, link directions and attitudes (theory, eqs. (7.22) to (7.27))."""
 
     TABLE: ClassVar[str] = "formation"
     OPTIONAL: ClassVar[bool] = True

@@ -27,7 +27,7 @@ def angles(q: Quaternion) -> Vec3:
 
 
 def geodetic(home: Home, position_world: Vec3) -> Vec3:
-    """Return latitude [deg], longitude [deg], height [m] of a point of the world frame (theory.md, eq. (3.6))."""
+    """Return latitude [deg], longitude [deg], height [m] of a point of the world frame (theory, eq. (3.6))."""
     (sp, cp, sl, cl), (x, y, z) = _origin(home)
     e, n, u = position_world
     outward = cp * u - sp * n  # away from the Earth's axis

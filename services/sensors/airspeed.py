@@ -1,4 +1,4 @@
-"""Airspeed sensor (pitot tube): dynamic pressure of the flow along its axis (theory.md, eq. (3.39))."""
+"""Airspeed sensor (pitot tube): dynamic pressure of the flow along its axis (theory, eq. (3.39))."""
 
 import math
 from typing import Annotated, Any, NamedTuple

@@ -1,4 +1,4 @@
-"""Static-pressure sensor (theory.md, section 3.2)."""
+"""Static-pressure sensor (theory, section 3.2)."""
 
 import math
 from typing import Annotated, NamedTuple
@@ -70,7 +70,7 @@ def blank() -> BarometerState:
 
 @kernel
 def position_error(e: StaticPressureError | None, truth: Truth) -> float:
-    """Return the static pressure error [Pa] of the flow around the vehicle (theory.md, eq. (3.65))."""
+    """Return the static pressure error [Pa] of the flow around the vehicle (theory, eq. (3.65))."""
     if e is None:
         return 0.0
     return 0.5 * truth.air_density * share_of_squares(e, rotate_back(truth.attitude, truth.air_velocity_world))

@@ -1,4 +1,4 @@
-"""Conversion of a true distance into a reading of a sonar or rangefinder (theory.md, section 3.2)."""
+"""Conversion of a true distance into a reading of a sonar or rangefinder (theory, section 3.2)."""
 
 import math
 from typing import Any, NamedTuple

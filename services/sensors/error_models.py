@@ -1,4 +1,4 @@
-"""Error models of instruments: white noise, first-order bias walk, saturation, quantisation (theory.md, section 3.2).
+"""Error models of instruments: white noise, first-order bias walk, saturation, quantisation (theory, section 3.2).
 
 Densities are one-sided: a density n [u/sqrt(Hz)] sampled at f [Hz] gives the standard deviation n sqrt(f/2), and the
 Allan deviation n / sqrt(2 tau).
@@ -22,7 +22,7 @@ def density_of_random_walk(walk_per_sqrt_hour: float) -> float:
 
 @always_inline
 def white_deviation(density: float, rate: float) -> float:
-    """Return the standard deviation of a sample of white noise with this one-sided density (theory.md, eq. (3.10))."""
+    """Return the standard deviation of a sample of white noise with this one-sided density (theory, eq. (3.10))."""
     return density * math.sqrt(0.5 * rate)
 
 
@@ -69,7 +69,7 @@ def digitise(v: Vec3, largest: float, step: float) -> Vec3:
 
 @always_inline
 def scale_and_misalignment(scale_error: float, misalignment: float, draw_scale: Vec3, draw_angle: Vec3) -> Mat3:
-    """Return the matrix of a triad with scale errors and small misalignments (theory.md, eq. (3.14))."""
+    """Return the matrix of a triad with scale errors and small misalignments (theory, eq. (3.14))."""
     a, b, c = scale(misalignment, draw_angle)
     x, y, z = scale(scale_error, draw_scale)
     return (1.0 + x, -c, b, c, 1.0 + y, -a, -b, a, 1.0 + z)

@@ -1,4 +1,4 @@
-"""Satellite receiver: delayed position on WGS 84 and velocity (theory.md, section 3.2)."""
+"""Satellite receiver: delayed position on WGS 84 and velocity (theory, section 3.2)."""
 
 from typing import Annotated, NamedTuple
 
@@ -127,7 +127,7 @@ def _position_error(p: Gps, s: GpsState, wander: Vec3, white: Vec3, fix: Solutio
 
 @kernel
 def _antenna_motion(antenna: Vec3 | None, truth: Truth) -> tuple[Vec3, Vec3]:
-    """Return position [m] and velocity [m/s] of the antenna in the world (theory.md, eq. (3.38))."""
+    """Return position [m] and velocity [m/s] of the antenna in the world (theory, eq. (3.38))."""
     if antenna is None:
         return truth.position_world, truth.velocity_world
     arm = rotate(truth.attitude, antenna)

@@ -1,4 +1,4 @@
-"""Inertial measurement unit: three gyroscopes and three accelerometers (theory.md, section 3.2)."""
+"""Inertial measurement unit: three gyroscopes and three accelerometers (theory, section 3.2)."""
 
 from typing import Annotated, NamedTuple
 

@@ -23,7 +23,7 @@ class Vibration(NamedTuple):
 
 @kernel
 def _force_at(position: Vec3 | None, truth: Truth, force: Vec3) -> Vec3:
-    """Return the specific force [m/s^2] at a position on the rotating body (theory.md, eq. (3.37))."""
+    """Return the specific force [m/s^2] at a position on the rotating body (theory, eq. (3.37))."""
     if position is None:
         return force
     omega = truth.omega_body
@@ -49,7 +49,7 @@ def velocity_world(position: Vec3 | None, truth: Truth) -> Vec3:
 
 @always_inline
 def means(p: Any, s: Any, truth: Truth, velocity_world: Vec3) -> tuple[Vec3, Vec3]:
-    """Return the mean rate [rad/s] and specific force [m/s^2] over the interval (theory.md, eq. (3.43)).
+    """Return the mean rate [rad/s] and specific force [m/s^2] over the interval (theory, eq. (3.43)).
 
     The rate is the rotation vector from the previous attitude; the force is in that attitude. Both include coning and
     sculling.
@@ -63,7 +63,7 @@ def means(p: Any, s: Any, truth: Truth, velocity_world: Vec3) -> tuple[Vec3, Vec
 def vibration_at(
     vibration: Vibration | None, delta_output: bool, rate: float, phase: float, truth: Truth
 ) -> tuple[float, Vec3]:
-    """Return the phase [rad] of the vibration and its specific force [m/s^2] (theory.md, eq. (3.44))."""
+    """Return the phase [rad] of the vibration and its specific force [m/s^2] (theory, eq. (3.44))."""
     if vibration is None:
         return phase, ZERO
     turn = vibration.harmonic * truth.rotor_speed / rate

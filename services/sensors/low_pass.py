@@ -1,4 +1,4 @@
-"""Internal filter of an instrument: second-order Butterworth with an additional delay (theory.md, eq. (3.48))."""
+"""Internal filter of an instrument: second-order Butterworth with an additional delay (theory, eq. (3.48))."""
 
 from typing import Annotated, NamedTuple
 

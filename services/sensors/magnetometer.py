@@ -1,4 +1,4 @@
-"""Three-axis magnetometer (theory.md, section 3.2)."""
+"""Three-axis magnetometer (theory, section 3.2)."""
 
 import math
 from typing import Annotated, NamedTuple
@@ -60,7 +60,7 @@ def _true_field(p: Magnetometer, truth: Truth) -> Vec3:
 
 @always_inline
 def soft_iron_matrix(deviation: float, along: Vec3, across: Vec3) -> Mat3:
-    """Return the symmetric matrix by which magnetised material distorts the field (theory.md, eq. (3.51))."""
+    """Return the symmetric matrix by which magnetised material distorts the field (theory, eq. (3.51))."""
     x, y, z = scale(deviation, along)
     a, b, c = scale(deviation, across)
     return (1.0 + x, a, b, a, 1.0 + y, c, b, c, 1.0 + z)

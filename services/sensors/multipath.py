@@ -1,4 +1,4 @@
-"""Shadow and reflections of satellite signals at obstacles of the terrain (theory.md, eqs. (3.57) to (3.59))."""
+"""Shadow and reflections of satellite signals at obstacles of the terrain (theory, eqs. (3.57) to (3.59))."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -43,7 +43,7 @@ def in_shadow(terrain: types.Type, position: types.Type, towards: types.Type, st
 
 @kernel
 def detour(box: Any, position: Vec3, towards: Vec3, across: bool) -> float:
-    """Return the additional path [m] of a signal by a wall of a box; 0 without a reflection (theory.md, eq. (3.57)).
+    """Return the additional path [m] of a signal by a wall of a box; 0 without a reflection (theory, eq. (3.57)).
 
     Args:
         box: row of `Relief.boxes`.
@@ -71,7 +71,7 @@ def detour(box: Any, position: Vec3, towards: Vec3, across: bool) -> float:
 
 @kernel
 def code_delay(r: Reflections, detour_length: float) -> float:
-    """Return the error [m] of a code measurement by a reflection with this detour [m] (theory.md, eq. (3.58))."""
+    """Return the error [m] of a code measurement by a reflection with this detour [m] (theory, eq. (3.58))."""
     q = r.amplitude * math.cos(2.0 * math.pi * detour_length / WAVELENGTH + math.radians(r.phase_deg))
     half = 0.5 * r.spacing
     if detour_length < (1.0 + q) * half:
@@ -85,7 +85,7 @@ def code_delay(r: Reflections, detour_length: float) -> float:
 
 @kernel
 def phase_delay(r: Reflections, detour_length: float) -> float:
-    """Return the error [m] of a carrier phase by a reflection with this detour [m] (theory.md, eq. (3.59))."""
+    """Return the error [m] of a carrier phase by a reflection with this detour [m] (theory, eq. (3.59))."""
     if detour_length > CHIP:
         return 0.0
     sine, cosine = math.sincos(2.0 * math.pi * detour_length / WAVELENGTH + math.radians(r.phase_deg))

@@ -1,4 +1,4 @@
-"""Optical flow sensor: angular rate of the ground in a downward camera (theory.md, eq. (3.41))."""
+"""Optical flow sensor: angular rate of the ground in a downward camera (theory, eq. (3.41))."""
 
 import math
 from typing import Annotated, Any, NamedTuple

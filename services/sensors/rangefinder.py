@@ -1,4 +1,4 @@
-"""Laser rangefinder: the distance along one ray, in any direction of the body (theory.md, eq. (3.40))."""
+"""Laser rangefinder: the distance along one ray, in any direction of the body (theory, eq. (3.40))."""
 
 from typing import Annotated, Any, NamedTuple
 

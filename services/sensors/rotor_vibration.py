@@ -1,4 +1,4 @@
-"""Vibration of an inertial measurement unit by each rotor: imbalance and blade passage (theory.md, eq. (3.49))."""
+"""Vibration of an inertial measurement unit by each rotor: imbalance and blade passage (theory, eq. (3.49))."""
 
 from typing import Annotated, Any, NamedTuple
 

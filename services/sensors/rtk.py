@@ -1,4 +1,4 @@
-"""Real-time kinematic solutions of a satellite receiver: single, float, fixed (theory.md, section 3.2)."""
+"""Real-time kinematic solutions of a satellite receiver: single, float, fixed (theory, section 3.2)."""
 
 from typing import Annotated, NamedTuple
 

@@ -1,4 +1,4 @@
-"""Satellites in view of a receiver: fixed directions, or a constellation on its orbits (theory.md, section 3.2)."""
+"""Satellites in view of a receiver: fixed directions, or a constellation on its orbits (theory, section 3.2)."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -58,7 +58,7 @@ class Solution(NamedTuple):
 
 @kernel
 def geometry(sky: tuple[Satellite, ...] | None) -> Mat3:
-    """Return the factor L of `GpsState`; NaN if the satellites do not determine a position (theory.md, eq. (3.42))."""
+    """Return the factor L of `GpsState`; NaN if the satellites do not determine a position (theory, eq. (3.42))."""
     if sky is None:
         return IDENTITY
     x = y = z = xx = xy = xz = yy = yz = zz = 0.0
@@ -102,7 +102,7 @@ def check_constellation(c: Constellation | None) -> None:
 
 @kernel
 def direction(c: Constellation, home: Home, k: int, time: float) -> Vec3:
-    """Return the unit vector, east, north, up, from home to satellite k at a time [s] (theory.md, eq. (3.55))."""
+    """Return the unit vector, east, north, up, from home to satellite k at a time [s] (theory, eq. (3.55))."""
     each = c.satellites // c.planes
     plane, slot = k // each, k % each
     radius = SEMI_MAJOR + c.altitude
@@ -161,7 +161,7 @@ def solution(
     c: Constellation | None, home: Home, terrain: Any, position: Vec3, time: float, errors: RangeErrors,
     correlated: float, white: float, carrier: bool, key: Key, tick: int,
 ) -> Solution:  # fmt: skip
-    """Return the fix by least squares over the satellites in view (theory.md, eq. (3.56)).
+    """Return the fix by least squares over the satellites in view (theory, eq. (3.56)).
 
     Args:
         c: constellation; None: satellites are not modelled.

@@ -1,4 +1,4 @@
-"""Scans of many rays: poses as a port, ray casting in the encoder (theory.md, eq. (3.52)).
+"""Scans of many rays: poses as a port, ray casting in the encoder (theory, eq. (3.52)).
 
 The port has only the poses of the instrument and of the other vehicles of a fleet, so that a scan that is neither
 recorded nor subscribed to is not computed.

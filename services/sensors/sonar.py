@@ -1,4 +1,4 @@
-"""Sonar: downward ultrasonic rangefinder (theory.md, section 3.2)."""
+"""Sonar: downward ultrasonic rangefinder (theory, section 3.2)."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -55,7 +55,7 @@ RAYS = 8  # along the edge of the beam, for obstacles off its axis
 
 @generic(inline=True)
 def _distance(p: types.Type, truth: types.Type) -> Any:
-    """Return the distance to the nearest ground in the beam; +inf without an echo (theory.md, eq. (3.16))."""
+    """Return the distance to the nearest ground in the beam; +inf without an echo (theory, eq. (3.16))."""
     return _over_level if truth.types[truth.fields.index("terrain")].instance_class is Level else _over_relief
 
 
@@ -99,7 +99,7 @@ def check(p: Sonar) -> None:
 
 @kernel
 def _heard_distance(echo: Echo | None, range_max: float, key: Key, tick: int, truth: Truth, distance: float) -> float:
-    """Return the distance, or inf if the echo is weaker than the noise (theory.md, eq. (3.70))."""
+    """Return the distance, or inf if the echo is weaker than the noise (theory, eq. (3.70))."""
     if echo is None or not 0.0 < distance < math.inf:
         return distance
     level = 20.0 / _BEL * math.log(range_max / distance) + 2.0 * echo.absorption_db_per_m * (range_max - distance)

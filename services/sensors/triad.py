@@ -1,4 +1,4 @@
-"""Errors of a triad of equal instruments, gyroscopes or accelerometers (theory.md, eq. (3.9))."""
+"""Errors of a triad of equal instruments, gyroscopes or accelerometers (theory, eq. (3.9))."""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -124,7 +124,7 @@ def accelerometer_units(a: Accelerometer) -> Units:
 
 @kernel
 def skewed_matrix(c: CrossCoupling | None, key: Key, lane: int, aligned: Mat3) -> Mat3:
-    """Return the matrix of a triad with its non-orthogonal axes (theory.md, eq. (3.50)); lane 0: gyroscopes."""
+    """Return the matrix of a triad with its non-orthogonal axes (theory, eq. (3.50)); lane 0: gyroscopes."""
     if c is None:
         return aligned
     a, b, d = scale(math.radians(c.non_orthogonality_deg), normal3(key, TURN_ON, _SKEWED + lane))
@@ -195,7 +195,7 @@ def measure(
     u: Units, t: Triad, p: Any, f: LowPass | None, warm_up: float, channel: int, key: Key, tick: int, value: Vec3,
     shift: Vec3, shake: Vec3,
 ) -> tuple[Triad, Vec3, bool]:  # fmt: skip
-    """Return the next state, reading and validity of a triad (theory.md, eq. (3.9)).
+    """Return the next state, reading and validity of a triad (theory, eq. (3.9)).
 
     Args:
         u: errors in SI units.

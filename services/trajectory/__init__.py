@@ -1,1 +1,1 @@
-"""The trajectory service: setpoints as a function of time (theory.md, section 4.1)."""
+"""The trajectory service: setpoints as a function of time (theory, section 4.1)."""

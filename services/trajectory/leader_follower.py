@@ -43,7 +43,7 @@ def rotate_setpoint(heading: Vec3, offset: Setpoint) -> tuple[Vec3, Vec3, Vec3]:
 
 @always_inline
 def step(p: FollowedPath, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[Setpoint], int]:
-    """Evaluate the setpoint at `tick`, with the vehicle's own phases (theory.md, eq. (4.1a)); the state is unused."""
+    """Evaluate the setpoint at `tick`, with the vehicle's own phases (theory, eq. (4.1a)); the state is unused."""
     t = tick * p.relative.interval
     leader = polynomial_piece.evaluate(p.leader.path, t, p.leader.final)
     offset = polynomial_piece.evaluate(p.relative.path, t, p.relative.final)

@@ -1,4 +1,4 @@
-"""Polynomial pieces, the primitive of all segments, and their compiled evaluation (theory.md, eq. (4.1))."""
+"""Polynomial pieces, the primitive of all segments, and their compiled evaluation (theory, eq. (4.1))."""
 
 from typing import NamedTuple
 
@@ -61,7 +61,7 @@ def last_not_after(times: np.ndarray, t: float) -> int:
 
 @always_inline
 def channel_at(channel: Channel, t: float) -> Vec3:
-    """Return value, first and second derivative of a channel at time t [s] (theory.md, eq. (4.1))."""
+    """Return value, first and second derivative of a channel at time t [s] (theory, eq. (4.1))."""
     k = last_not_after(channel.start, t)
     c = channel.coefficients[k]
     s = t - channel.start[k]

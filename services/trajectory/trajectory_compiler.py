@@ -1,4 +1,4 @@
-"""Compiler of phases into polynomial pieces that can be evaluated at any time (theory.md, section 4.1)."""
+"""Compiler of phases into polynomial pieces that can be evaluated at any time (theory, section 4.1)."""
 
 from typing import NamedTuple
 

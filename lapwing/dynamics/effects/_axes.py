@@ -52,7 +52,7 @@ def _thrust_along_z(arguments):
 
 @always_inline
 def _push(_, axis, load):
-    """Return (force [N], torque [N m]) of a rotor: r x T a + s Q a (theory.md, eq. (1.6b))."""
+    """Return (force [N], torque [N m]) of a rotor: r x T a + s Q a (theory, eq. (1.6b))."""
     place, thrust, reaction = load
     force = scale(thrust, axis)
     return force, add(cross(place, force), scale(reaction, axis))

@@ -31,7 +31,7 @@ class Settings(NamedTuple):
 
 
 class GroundContact(NamedTuple):
-    """Feet that stick until the friction cone is exceeded (theory.md, eq. (2.12) to (2.16)).
+    """Feet that stick until the friction cone is exceeded (theory, eq. (2.12) to (2.16)).
 
     The friction is a spring and damper in series with a Coulomb slider, whose coefficient falls from the static to the
     dynamic one with the slip. Its deflection is a state under the integrator's error control: sticking, sliding and
@@ -86,7 +86,7 @@ class GroundContact(NamedTuple):
 
 
 class GroundContactSmooth(NamedTuple):
-    """Feet under a friction that is a function of velocity only (theory.md, eq. (2.17)).
+    """Feet under a friction that is a function of velocity only (theory, eq. (2.17)).
 
     Source: the "smooth stick-slip" law that Pappalardo et al. 2023, section 6.1, take from Simscape Multibody. It
     creeps on a slope, and near rest it is a damper of about 1.5 mu_s m g / v_c, so stiff that steps are split while in

@@ -81,7 +81,7 @@ def _touch_four(terrain, places_world):
 
 @always_inline
 def contact_of_feet(e, stance, feet_body):
-    """Return the contact of four feet (theory.md, eq. (2.12))."""
+    """Return the contact of four feet (theory, eq. (2.12))."""
     arm = apply(stance.R_world_body, feet_body)
     place = add(stance.position_world, arm)
     depth, normal, wedge = _touch_four(e.terrain, place)

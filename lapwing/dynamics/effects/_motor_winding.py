@@ -1,4 +1,4 @@
-"""Winding of a motor with inductance: constants and transient currents (theory.md, eq. (2.76)).
+"""Winding of a motor with inductance: constants and transient currents (theory, eq. (2.76)).
 
 Functions take the constants of a winding, or () without inductance; the choice is part of the type.
 """

@@ -59,7 +59,7 @@ def conditions(table: dict) -> Conditions:
 
 @always_inline
 def intensity(wind_speed, altitude):
-    """Return (standard deviations [m/s], scales [m]) along, across and vertical to the wind (theory.md, eq. (2.20))."""
+    """Return (standard deviations [m/s], scales [m]) along, across and vertical to the wind (theory, eq. (2.20))."""
     feet = altitude / FOOT
     base = 0.177 + 0.000823 * feet
     vertical = 0.1 * wind_speed
@@ -95,14 +95,14 @@ def in_world(c: Conditions, u: float, v: float, w: float) -> Vec3:
 
 @always_inline
 def first_order(x, theta, n):
-    """Return the state of the longitudinal filter `theta` correlation times later (theory.md, eq. (2.22))."""
+    """Return the state of the longitudinal filter `theta` correlation times later (theory, eq. (2.22))."""
     decay = math.exp(-theta)
     return decay * x + math.sqrt(1.0 - decay * decay) * n
 
 
 @always_inline
 def second_order(x1, x2, theta, n1, n2):
-    """Return the states of the transverse filter `theta` correlation times later (theory.md, eq. (2.23))."""
+    """Return the states of the transverse filter `theta` correlation times later (theory, eq. (2.23))."""
     decay = math.exp(-theta)
     square = decay * decay
     q11 = 0.5 * (1.0 - square)
@@ -139,7 +139,7 @@ def advance_filters(states, theta, first, second):
 
 @always_inline
 def transverse(x1, x2):
-    """Return the output of the transverse filter, with unit variance (theory.md, eq. (2.24))."""
+    """Return the output of the transverse filter, with unit variance (theory, eq. (2.24))."""
     return math.sqrt(3.0) * x1 + (1.0 - math.sqrt(3.0)) * x2
 
 

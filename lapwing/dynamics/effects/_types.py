@@ -123,7 +123,7 @@ class Loads(NamedTuple):
 class WakeSlopes(NamedTuple):
     """Coupling of the loads of rotors in the wakes of others; empty without any.
 
-    A row and a column per rotor, relative to the isolated thrust, about one speed of all rotors (theory.md, eq.
+    A row and a column per rotor, relative to the isolated thrust, about one speed of all rotors (theory, eq.
     (2.45)).
     """
 

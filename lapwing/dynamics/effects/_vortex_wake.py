@@ -1,4 +1,4 @@
-"""Flow about a uniform rotor in forward flight: a skewed cylinder of vortex rings (theory.md, eq. (2.73)).
+"""Flow about a uniform rotor in forward flight: a skewed cylinder of vortex rings (theory, eq. (2.73)).
 
 After Coleman, Feingold and Stempin, NACA ARR L5E10 (1945), and Castles and De Leeuw, NACA TR 1184 (1954); the integral
 along the wake is taken in closed form, that around it by the trapezoidal rule.

@@ -15,7 +15,7 @@ class Settings(NamedTuple):
 
 
 class AirDensity(NamedTuple):
-    """Density of the scene's atmosphere at the vehicle's altitude (theory.md, eq. (2.3)).
+    """Density of the scene's atmosphere at the vehicle's altitude (theory, eq. (2.3)).
 
     Linear in altitude within a communication step.
     Source: the International Standard Atmosphere, ISO 2533:1975. Valid to 20 km above the sea.

@@ -21,7 +21,7 @@ class Settings(NamedTuple):
 
 
 class AxialInflow(NamedTuple):
-    """Change of the static loads of `rotor_thrust` in climb and descent (theory.md, eq. (2.5)).
+    """Change of the static loads of `rotor_thrust` in climb and descent (theory, eq. (2.5)).
 
     The angle of attack decreases with the axial advance per revolution: T = T_0 (1 - w / speed), and the induced torque
     with the square. w = 2 pi V / pitch uses the axial speed V of each hub, which damps roll and pitch. Source: the

@@ -22,7 +22,7 @@ class Settings(NamedTuple):
 
 
 class Battery(NamedTuple):
-    """Lithium-polymer cells in series: open-circuit voltage of the charge minus an ohmic drop (theory.md, eq. (2.10)).
+    """Lithium-polymer cells in series: open-circuit voltage of the charge minus an ohmic drop (theory, eq. (2.10)).
 
     The battery voltage limits the motor voltages. Charge and voltage are updated once per
     communication step. Source: Chen and Rincon-Mora, IEEE Trans. Energy Conversion 21 (2006) 504, open-circuit

@@ -42,7 +42,7 @@ class Settings(NamedTuple):
 
 
 class BatteryThevenin(NamedTuple):
-    """Thevenin model: open-circuit voltage, an ohmic resistance and two RC elements in series (theory.md, eq. (2.34)).
+    """Thevenin model: open-circuit voltage, an ohmic resistance and two RC elements in series (theory, eq. (2.34)).
 
     Resistances decrease as losses warm the pack. Source: Chen and Rincon-Mora, IEEE Trans. Energy Conversion 21
     (2006) 504: curve, ratios of the resistances and both time constants, above 20 % of charge; one thermal mass.

@@ -20,7 +20,7 @@ class Settings(NamedTuple):
 
 
 class BodyDrag(NamedTuple):
-    """Linear and quadratic drag at the centre of mass, each axis with its own coefficients (theory.md, eq. (2.7)).
+    """Linear and quadratic drag at the centre of mass, each axis with its own coefficients (theory, eq. (2.7)).
 
     Source: dimensional analysis; drag coefficient times area from the airframe. Valid for low Mach numbers and
     Reynolds numbers at which the drag coefficients are constant.

@@ -20,7 +20,7 @@ class Settings(NamedTuple):
 
 
 class BodyWrench(NamedTuple):
-    """Constant force and torque in body axes, the trim of a real vehicle (theory.md, eq. (2.65)).
+    """Constant force and torque in body axes, the trim of a real vehicle (theory, eq. (2.65)).
 
     It represents loads that are constant over seconds and that no other effect explains: a shifted centre of mass,
     unequal motors, a bent arm. Source: the output bias of output-error estimation, Jategaonkar, Flight Vehicle System

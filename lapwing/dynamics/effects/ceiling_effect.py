@@ -30,7 +30,7 @@ class Settings(NamedTuple):
 
 
 class CeilingEffect(NamedTuple):
-    """Change of thrust and torque by a ceiling that reduces the induced flow (theory.md, eq. (2.69), (2.70)).
+    """Change of thrust and torque by a ceiling that reduces the induced flow (theory, eq. (2.69), (2.70)).
 
     Source: Hsiao and Chirarattananon, IEEE/ASME Trans. Mechatronics 24 (2019) 2316, momentum theory of the induced
     power, without recirculation; blades of one pitch as in `dynamic_inflow`. Valid in hover for distances above a

@@ -29,7 +29,7 @@ class Settings(NamedTuple):
 
 
 class CoaxialInterference(NamedTuple):
-    """Change of thrust and torque of a lower rotor in the wake of an upper rotor (theory.md, eq. (2.43), (2.44)).
+    """Change of thrust and torque of a lower rotor in the wake of an upper rotor (theory, eq. (2.43), (2.44)).
 
     Momentum theory for blades of constant pitch. The inner half of the lower disc receives twice the induced velocity
     of the upper rotor. The upper rotor is modelled as isolated. Source: Leishman, Principles of Helicopter
@@ -76,7 +76,7 @@ class CoaxialInterference(NamedTuple):
         ]
 
     def slopes(self) -> WakeSlopes:
-        """Return the coupling of thrusts and torques, all rotors at one speed in still air (theory.md, eq. (2.45))."""
+        """Return the coupling of thrusts and torques, all rotors at one speed in still air (theory, eq. (2.45))."""
         q, count = self.pitch, len(self.above)
         t = python_function(inflow.thrust_in_wake)(q, 1.0)
         through = q - (q - 1.0) * t

@@ -34,7 +34,7 @@ class Settings(NamedTuple):
 
 
 class Collision(NamedTuple):
-    """Spheres with elastic impact and friction (theory.md, eq. (2.60), (2.61), (2.77)).
+    """Spheres with elastic impact and friction (theory, eq. (2.60), (2.61), (2.77)).
 
     An impulse along the line of centres and a friction impulse against the slip act on both vehicles as a force and a
     torque over one communication step, so that momentum and angular momentum are conserved. Source: Newton's law of

@@ -31,7 +31,7 @@ class Settings(NamedTuple):
 
 
 class DcMotor(NamedTuple):
-    """Direct-current motor behind a belt: J w' = e K (I - I_0) - M, I = (V - K w) / R (theory.md, eq. (2.9), (2.76)).
+    """Direct-current motor behind a belt: J w' = e K (I - I_0) - M, I = (V - K w) / R (theory, eq. (2.9), (2.76)).
 
     The resistance includes motor and controller, the inertia the rotor and, through the belt, the motor. The lower
     limit of the current is minus the braking current of the controller. The upper limit is the lowest of the

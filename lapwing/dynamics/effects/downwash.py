@@ -20,7 +20,7 @@ class Settings(NamedTuple):
 
 
 class Downwash(NamedTuple):
-    """Wind in the jet of each other vehicle that has this effect (theory.md, eq. (2.62) to (2.64)).
+    """Wind in the jet of each other vehicle that has this effect (theory, eq. (2.62) to (2.64)).
 
     All rotors of a vehicle form one jet, opposite to their thrust. The developed jet has twice the induced velocity of
     momentum theory, a Gaussian profile whose width grows with the distance, and the momentum of the thrust. It acts

@@ -26,7 +26,7 @@ class Settings(NamedTuple):
 
 
 class DynamicInflow(NamedTuple):
-    """Change of the static loads of `rotor_thrust` by the flow through the rotor (theory.md, eq. (2.35), (2.36)).
+    """Change of the static loads of `rotor_thrust` by the flow through the rotor (theory, eq. (2.35), (2.36)).
 
     The inflow is the axial air speed plus the induced velocity: momentum theory in climb and forward flight (Glauert),
     a fit to measurements in descent, multiplied by the propeller's induced power factor. Sources:

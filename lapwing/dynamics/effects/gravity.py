@@ -15,7 +15,7 @@ class Settings(NamedTuple):
 
 
 class Gravity(NamedTuple):
-    """Weight m g down (theory.md, eq. (2.1)).
+    """Weight m g down (theory, eq. (2.1)).
 
     Source: the scene's gravity at sea level, independent of position. Valid to 0.03 % within 1 km of the sea level;
     `gravity_altitude` beyond that.

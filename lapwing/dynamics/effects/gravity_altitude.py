@@ -17,7 +17,7 @@ class Settings(NamedTuple):
 
 
 class GravityAltitude(NamedTuple):
-    """Weight m g (R / (R + h))^2 down (theory.md, eq. (2.2)).
+    """Weight m g (R / (R + h))^2 down (theory, eq. (2.2)).
 
     Source: Newton's law with the radius of the U.S. Standard Atmosphere 1976; updated once per communication step.
     Valid within the atmosphere.

@@ -41,7 +41,7 @@ def far(e, motion, h):
 
 @always_inline
 def _element(e, deflection, foot):
-    """Return (friction force [N], rate of the deflection [m/s]) of four feet (theory.md, eq. (2.13), (2.14))."""
+    """Return (friction force [N], rate of the deflection [m/s]) of four feet (theory, eq. (2.13), (2.14))."""
     k, n = e.tangential_stiffness, foot.normal
     pull, slip = scale(k, deflection), foot.slip
     stretched = add(subtract(pull, scale(dot(pull, n), n)), scale(e.tangential_damping, slip))

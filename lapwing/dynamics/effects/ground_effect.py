@@ -20,7 +20,7 @@ class Settings(NamedTuple):
 
 
 class GroundEffect(NamedTuple):
-    """Thrust of each rotor over 1 - (R / 4 z)^2 at its height z above the ground (theory.md, eq. (2.25)).
+    """Thrust of each rotor over 1 - (R / 4 z)^2 at its height z above the ground (theory, eq. (2.25)).
 
     Source: Cheeseman and Bennett, ARC R&M 3021 (1955), for an isolated rotor in hover. Valid
     for heights above half a radius, over ground that is flat for some radii around.

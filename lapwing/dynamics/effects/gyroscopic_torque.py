@@ -16,7 +16,7 @@ class Settings(NamedTuple):
 
 
 class GyroscopicTorque(NamedTuple):
-    """Gyroscopic torque and spin-up reaction of the rotors (theory.md, eq. (2.6)).
+    """Gyroscopic torque and spin-up reaction of the rotors (theory, eq. (2.6)).
 
     Source: Euler's equations of a body with rotors that spin about axes fixed in it; the propeller's inertia is
     averaged over a revolution. Valid while the rotors spin much faster than the body.

@@ -21,7 +21,7 @@ class Settings(NamedTuple):
 
 
 class HForce(NamedTuple):
-    """Force -rho c w v on each rotor, across its axis, from the rotor's speed w and its velocity v (theory.md, eq.
+    """Force -rho c w v on each rotor, across its axis, from the rotor's speed w and its velocity v (theory, eq.
     (2.11)).
 
     Source: the H-force of blade-element theory, C_H = sigma c_d mu / 4 (Leishman, Principles of Helicopter

@@ -37,7 +37,7 @@ class Settings(NamedTuple):
 
 
 class MultirotorGroundEffect(NamedTuple):
-    """Thrust of each rotor over 1 - s, the share of its flow that the images of all rotors cancel (theory.md, eq.
+    """Thrust of each rotor over 1 - s, the share of its flow that the images of all rotors cancel (theory, eq.
     (2.67), (2.68)).
 
     Source: Sanchez-Cuevas, Heredia and Ollero, Int. J. Aerospace Engineering 2017, 1823056: method of images, and a

@@ -24,8 +24,8 @@ class Settings(NamedTuple):
 class PayloadRelease(NamedTuple):
     """Uniform box whose mass and inertia the vehicle loses at its release.
 
-    The airframe's [payload] sets its position, and the release moves the centre of mass (theory.md, eqs. (2.41) and
-    (2.42)). Without that table the box is at the centre of mass (theory.md, eq. (2.26)). Source: the payload of
+    The airframe's [payload] sets its position, and the release moves the centre of mass (theory, eqs. (2.41) and
+    (2.42)). Without that table the box is at the centre of mass (theory, eq. (2.26)). Source: the payload of
     Pappalardo et al. 2023, Table 2, size chosen; Steiner's theorem. Valid for a payload released at rest relative to
     the vehicle.
     """

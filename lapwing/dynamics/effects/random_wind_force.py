@@ -33,7 +33,7 @@ class Settings(NamedTuple):
 
 
 class RandomWindForce(NamedTuple):
-    """Random force 1/2 C_s S rho |v| v at the centre of mass for a relative wind v (theory.md, eq. (2.8)).
+    """Random force 1/2 C_s S rho |v| v at the centre of mass for a relative wind v (theory, eq. (2.8)).
 
     Other effects see still air.
 

@@ -18,7 +18,7 @@ class Settings(NamedTuple):
 
 
 class RotationalDrag(NamedTuple):
-    """Torque -c omega about each body axis, relative to the air (theory.md, eq. (2.66)).
+    """Torque -c omega about each body axis, relative to the air (theory, eq. (2.66)).
 
     It lumps the damping of the rotors, whose inflow changes as the vehicle rolls and pitches, and of the fuselage.
     Source: the damping derivatives L_p, M_q, N_r of flight mechanics; identified from flights. Valid for rates at

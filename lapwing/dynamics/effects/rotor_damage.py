@@ -22,7 +22,7 @@ class Settings(NamedTuple):
 
 
 class RotorDamage(NamedTuple):
-    """Reduction of thrust and torque of one rotor from a given time on (theory.md, eq. (2.27)).
+    """Reduction of thrust and torque of one rotor from a given time on (theory, eq. (2.27)).
 
     Source: the definition. Valid for the mean loads of a torn or lost blade, without imbalance and vibration; the
     motor continues to turn.

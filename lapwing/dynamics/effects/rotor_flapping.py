@@ -26,7 +26,7 @@ class Settings(NamedTuple):
 
 
 class RotorFlapping(NamedTuple):
-    """Tilt of disc and thrust by a_1 = k mu / (1 - mu^2 / 2), mu = V / (w R) (theory.md, eq. (2.38)).
+    """Tilt of disc and thrust by a_1 = k mu / (1 - mu^2 / 2), mu = V / (w R) (theory, eq. (2.38)).
 
     A stiff hub transmits the tilt as a moment. k = 4 theta_t - 2 lambda for blades with ideal twist, at the inflow of
     hover. Source: Pounds, Mahony and Corke, Control Engineering Practice 18 (2010) 691; Leishman, section 4.

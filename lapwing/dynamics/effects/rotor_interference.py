@@ -27,7 +27,7 @@ class Settings(NamedTuple):
 
 
 class RotorInterference(NamedTuple):
-    """Change of static loads by the induced flow of the other rotors (theory.md, eq. (2.73) to (2.75)).
+    """Change of static loads by the induced flow of the other rotors (theory, eq. (2.73) to (2.75)).
 
     Source: skewed cylinder of vortex rings of Castles and De Leeuw, NACA TR 1184 (1954), its mean over each disc; flow
     of each rotor by Glauert; blades of one pitch as in `dynamic_inflow`. Zero in hover. Valid for rotors in one plane,

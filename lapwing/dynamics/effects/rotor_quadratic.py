@@ -14,7 +14,7 @@ KIND = "rotor thrust model"
 
 
 class RotorQuadratic(NamedTuple):
-    """Thrust b w^2 and torque d w^2 of every rotor, independent of the air density (theory.md, eq. (2.4)).
+    """Thrust b w^2 and torque d w^2 of every rotor, independent of the air density (theory, eq. (2.4)).
 
     Source: the usual model of the quadrotor literature, e.g. Bouabdallah, thesis EPFL 3727 (2007). Valid near hover, at
     the altitude at which the constants were measured.

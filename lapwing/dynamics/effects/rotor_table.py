@@ -40,7 +40,7 @@ class Settings(NamedTuple):
 
 
 class RotorTable(NamedTuple):
-    """T = C_T rho n^2 D^4, Q = C_P rho n^2 D^5 / (2 pi) with coefficients from a table (theory.md, eq. (2.37)).
+    """T = C_T rho n^2 D^4, Q = C_P rho n^2 D^5 / (2 pi) with coefficients from a table (theory, eq. (2.37)).
 
     Linear interpolation, constant beyond the first and last row. A table with one angle uses the axial air speed for
     the advance ratio; a table with several angles uses the total air speed and its angle. Source: the measurements.

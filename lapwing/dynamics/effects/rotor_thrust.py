@@ -17,7 +17,7 @@ class Settings(NamedTuple):
 
 
 class RotorThrust(NamedTuple):
-    """Thrust and torque proportional to air density and speed squared (theory.md, eq. (2.28); (1.7) and (1.8)).
+    """Thrust and torque proportional to air density and speed squared (theory, eq. (2.28); (1.7) and (1.8)).
 
     Source: Pappalardo et al. 2023, section 2.6. Valid at rest and for advance ratios well below pitch over diameter;
     add `axial_inflow` beyond that.

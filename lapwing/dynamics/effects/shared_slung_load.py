@@ -28,7 +28,7 @@ class Settings(NamedTuple):
 
 
 class SharedSlungLoad(NamedTuple):
-    """Force of the cable to the shared load (theory.md, eq. (1.20), (1.23)).
+    """Force of the cable to the shared load (theory, eq. (1.20), (1.23)).
 
     Source: Newton's laws; Hooke's law and a damper for a cable that only pulls. Load and vehicles are integrated
     separately. Each extrapolates the motion of the other from its acceleration at the start of the communication step.

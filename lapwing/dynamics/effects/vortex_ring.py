@@ -33,7 +33,7 @@ class Settings(NamedTuple):
 
 
 class VortexRing(NamedTuple):
-    """Factor on the thrust of each rotor in descent with a mean loss and a random oscillation (theory.md, eq. (2.71),
+    """Factor on the thrust of each rotor in descent with a mean loss and a random oscillation (theory, eq. (2.71),
     (2.72)).
 
     Sources: losses and fluctuations are largest at 1.2 to 1.3 times the induced velocity in hover: Veismann, Dougherty

@@ -22,7 +22,7 @@ class Settings(NamedTuple):
 
 
 class WindBoundaryLayer(NamedTuple):
-    """Steady wind with the logarithmic profile of the neutral surface layer (theory.md, eq. (2.32)).
+    """Steady wind with the logarithmic profile of the neutral surface layer (theory, eq. (2.32)).
 
     Source: Stull, An Introduction to Boundary Layer Meteorology (1988), section 9.7. Valid to about 100 m over ground
     of uniform roughness, not between obstacles.

@@ -14,7 +14,7 @@ Speed = Annotated[float, Ge(-60), Le(60)]
 
 
 class WindConstant(NamedTuple):
-    """Uniform constant wind (theory.md, eq. (2.18)).
+    """Uniform constant wind (theory, eq. (2.18)).
 
     It acts through the effects that use the air velocity.
     Valid well above the ground's boundary layer.

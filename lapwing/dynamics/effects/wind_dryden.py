@@ -16,7 +16,7 @@ PARTS = (Part(1.0, 1.0, LANES),)
 
 
 class WindDryden(NamedTuple):
-    """Gusts along, across and vertical to the mean wind with the Dryden spectra (theory.md, eq. (2.20) to (2.24)).
+    """Gusts along, across and vertical to the mean wind with the Dryden spectra (theory, eq. (2.20) to (2.24)).
 
     Source: MIL-F-8785C, low-altitude model (the spectra of MIL-HDBK-1797 are the same, written with halved lateral and
     vertical scales). Valid from 10 to 1000 feet above the ground; beyond, the values at the limits apply. Sampled

@@ -46,7 +46,7 @@ class Settings(NamedTuple):
 
 
 class WindDrydenRates(NamedTuple):
-    """Gusts of `wind_dryden`, bit-for-bit identical, and angular rates of the air (theory.md, eq. (2.39)).
+    """Gusts of `wind_dryden`, bit-for-bit identical, and angular rates of the air (theory, eq. (2.39)).
 
     The rates change the air velocity at the rotor hubs. Source: MIL-F-8785C, section 3.7.5: p has its own filter, q and
     r follow from the passing transverse gusts. Valid as `wind_dryden`. Sampled exactly once per communication step, and
@@ -76,7 +76,7 @@ class WindDrydenRates(NamedTuple):
 
 @always_inline
 def low_pass(x1, x2, z, beta, theta, n1, n2, n3):
-    """Return the low-passed transverse gust z, `theta` gust correlation times later (theory.md, eq. (2.40)).
+    """Return the low-passed transverse gust z, `theta` gust correlation times later (theory, eq. (2.40)).
 
     Args:
         x1: previous first state of the gust's filter.

@@ -13,7 +13,7 @@ Speed = Annotated[float, Ge(-60), Le(60)]
 
 
 class WindGust(NamedTuple):
-    """Gust with a one-minus-cosine profile (theory.md, eq. (2.19)).
+    """Gust with a one-minus-cosine profile (theory, eq. (2.19)).
 
     Source: the discrete gust of CS-25.341, in time instead of distance; its first half is that of MIL-F-8785C. Valid
     for vehicles much smaller than the gust.

@@ -18,7 +18,7 @@ PARTS = tuple(Part(ratio, share, (LANE + 2 * k, LANE + 2 * k + 1)) for k, (ratio
 
 
 class WindVonKarman(NamedTuple):
-    """Gusts along, across and vertical to the mean wind with the von Karman spectra (theory.md, eq. (2.31)).
+    """Gusts along, across and vertical to the mean wind with the von Karman spectra (theory, eq. (2.31)).
 
     Source: MIL-F-8785C, low-altitude model. A sum of four independent Dryden turbulences of falling scale, whose
     spectra are within 2.1 % of von Karman's up to 300 times the corner frequency. Valid from 10 to 1000 feet above the

@@ -14,7 +14,7 @@ BETA = 0.04  # integral gain of the controller (Hairer, Wanner: Solving ODEs II,
 def integrate_adaptive(p, x, times, tolerance, out):
     """Write the state's numbers at each of `times` (increasing, the first that of x) into the rows of `out`.
 
-    Return (status, t, x, steps, rejected) at the end (theory.md, eq. (6.17)).
+    Return (status, t, x, steps, rejected) at the end (theory, eq. (6.17)).
     """
     t, end = times[0], times[-1]
     f = rate(p, t, x)

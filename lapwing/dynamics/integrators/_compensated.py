@@ -1,4 +1,4 @@
-"""Compensated summation: a state with the rounding errors of the sums that made it (theory.md, eq. (2.79)).
+"""Compensated summation: a state with the rounding errors of the sums that made it (theory, eq. (2.79)).
 
 Kahan, Comm. ACM 8 (1965) 40; Moeller, BIT 5 (1965) 37 and 251; for steps of an integrator Hairer, Lubich, Wanner,
 Geometric Numerical Integration, section VIII.5.
@@ -67,7 +67,7 @@ def rounded(x):
 
 @generic(inline=True)
 def extrapolate(method, halves, whole):
-    """Return the result of two half steps without the leading term of its error (theory.md, eq. (2.33))."""
+    """Return the result of two half steps without the leading term of its error (theory, eq. (2.33))."""
     share = 1.0 / (2.0 ** sys.modules[method.instance_class.__module__].ORDER - 1.0)
     if is_compensated(halves):
         return lambda method, halves, whole: add(halves, scale(share, difference(halves, whole)))

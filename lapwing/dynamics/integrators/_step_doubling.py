@@ -35,7 +35,7 @@ class StepDoubling(NamedTuple):
 
 @always_inline
 def shorter(part, error, tolerance):
-    """Return the next substep after one with too large an error (theory.md, eq. (2.33))."""
+    """Return the next substep after one with too large an error (theory, eq. (2.33))."""
     return part * min(max(0.1, 0.7 * math.sqrt(tolerance / error)), 0.3)
 
 

@@ -15,7 +15,7 @@ Method = method_token(__name__)
 
 @always_inline
 def step(rate, p, t, x, h):
-    """Take a step of four stages and five exponentials, with x exp(k1/2) used twice (theory.md, eq. (6.10))."""
+    """Take a step of four stages and five exponentials, with x exp(k1/2) used twice (theory, eq. (6.10))."""
     half = 0.5 * h
     k1 = scale(h, rate(p, t, x))
     x2 = retract(x, scale(0.5, k1))

@@ -1,7 +1,7 @@
 """The gyrostat paper's explicit Runge-Kutta method on a manifold, eRK4M: stages are transported back to x and combined.
 
 Of fourth order only by analogy: on a curved manifold it has order 3, because parallel transport differs from the
-differential of the exponential by the curvature at second order (theory.md, eq. (6.12)).
+differential of the exponential by the curvature at second order (theory, eq. (6.12)).
 """
 
 from lapwing.dynamics.integrators._fixed_step import method_token

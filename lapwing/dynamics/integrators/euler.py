@@ -12,5 +12,5 @@ Method = method_token(__name__)
 
 @always_inline
 def step(rate, p, t, x, h):
-    """Return x + h x' (theory.md, eq. (6.1))."""
+    """Return x + h x' (theory, eq. (6.1))."""
     return axpy(h, embed(x, rate(p, t, x)), x)

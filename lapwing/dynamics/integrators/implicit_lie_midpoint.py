@@ -15,7 +15,7 @@ ITERATIONS = 60
 
 @always_inline
 def step(rate, p, t, x, h):
-    """Solve u = h f(t + h/2, x exp(u/2)). Return x exp(u) (theory.md, eq. (6.13)).
+    """Solve u = h f(t + h/2, x exp(u/2)). Return x exp(u) (theory, eq. (6.13)).
 
     Fixed-point iteration until u is constant to round-off; it contracts while h times the Lipschitz constant of f is
     below two. A larger step gives NaN, not a wrong state.

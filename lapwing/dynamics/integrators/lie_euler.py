@@ -15,5 +15,5 @@ Method = method_token(__name__)
 
 @always_inline
 def step(rate, p, t, x, h):
-    """Return x exp(h f) (theory.md, eq. (6.2))."""
+    """Return x exp(h f) (theory, eq. (6.2))."""
     return retract(x, scale(h, rate(p, t, x)))

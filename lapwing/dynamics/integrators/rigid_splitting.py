@@ -3,7 +3,7 @@
 The free body's kinetic energy is a sum of three terms whose flows are plain rotations (McLachlan 1993; Reich 1994); the
 torque, of time and attitude only, is a kick between them. Strang's symmetric composition of these is raised to order 6
 by the nine stages of Kahan and Li, Math. Comp. 66 (1997) 1089. The momentum of a free body is only ever rotated, so it
-is kept to round-off in the world, and the energy error stays bounded for all times (theory.md, section 6.6).
+is kept to round-off in the world, and the energy error stays bounded for all times (theory, section 6.6).
 """
 
 from typing import Any
@@ -71,7 +71,7 @@ def _torque(rate, p, t, x):
 
 @always_inline
 def step(rate, p, t, x, h):
-    """Take nine Strang steps of kick, free flow, kick, with adjacent kicks combined (theory.md, eq. (6.16))."""
+    """Take nine Strang steps of kick, free flow, kick, with adjacent kicks combined (theory, eq. (6.16))."""
     attitude, momentum = x[0], multiply(p.inertia, x[1])
     before = 0.0
     for stage in STAGES:

@@ -12,7 +12,7 @@ Method = method_token(__name__)
 
 @always_inline
 def increment(rate, p, t, x, h):
-    """Return what a step adds to the stored numbers: the classical tableau (theory.md, eq. (6.3))."""
+    """Return what a step adds to the stored numbers: the classical tableau (theory, eq. (6.3))."""
     half = 0.5 * h
     k1 = embed(x, rate(p, t, x))
     x2 = axpy(half, k1, x)

@@ -14,5 +14,5 @@ increment = rk4.increment
 
 @always_inline
 def step(rate, p, t, x, h):
-    """Take a step of `rk4` and project it onto the manifold; the projection keeps the order (theory.md, eq. (6.4))."""
+    """Take a step of `rk4` and project it onto the manifold; the projection keeps the order (theory, eq. (6.4))."""
     return normalise(rk4.step(rate, p, t, x, h))

@@ -107,5 +107,5 @@ def increment(rate, p, t, x, h):
 
 @always_inline
 def step(rate, p, t, x, h):
-    """Take a step; the projection preserves the order (theory.md, eq. (6.4))."""
+    """Take a step; the projection preserves the order (theory, eq. (6.4))."""
     return normalise(_add(_slopes(rate, p, t, x, h), h, x))

@@ -12,6 +12,6 @@ Method = method_token(__name__)
 
 @always_inline
 def step(rate, p, t, x, h):
-    """Return x exp(h f(t + h/2, x exp(h f / 2))) (theory.md, eq. (6.6))."""
+    """Return x exp(h f(t + h/2, x exp(h f / 2))) (theory, eq. (6.6))."""
     middle = retract(x, scale(0.5 * h, rate(p, t, x)))
     return retract(x, scale(h, rate(p, t + 0.5 * h, middle)))

@@ -12,7 +12,7 @@ Method = method_token(__name__)
 
 @always_inline
 def step(rate, p, t, x, h):
-    """Take a step of three stages, with only the correction that the order needs (theory.md, eq. (6.8))."""
+    """Take a step of three stages, with only the correction that the order needs (theory, eq. (6.8))."""
     k1 = scale(h, rate(p, t, x))
     k2 = scale(h, rate(p, t + h / 3.0, retract(x, scale(1.0 / 3.0, k1))))
     k3 = scale(h, rate(p, t + 2.0 * h / 3.0, retract(x, scale(2.0 / 3.0, k2))))

@@ -16,7 +16,7 @@ Method = method_token(__name__)
 
 @always_inline
 def step(rate, p, t, x, h):
-    """Take a step of four stages, each one exponential from x (theory.md, eq. (6.7))."""
+    """Take a step of four stages, each one exponential from x (theory, eq. (6.7))."""
     half = 0.5 * h
     k1 = scale(h, rate(p, t, x))
     k2 = scale(h, rate(p, t + half, retract(x, scale(0.5, k1))))

@@ -15,14 +15,14 @@ Method = method_token(__name__)
 
 @always_inline
 def _dexpinv(x, u, k):
-    """Return dexpinv(u, k) to the order of the method: k - [u, k]/2 + [u, [u, k]]/12 (theory.md, eq. (5.4))."""
+    """Return dexpinv(u, k) to the order of the method: k - [u, k]/2 + [u, [u, k]]/12 (theory, eq. (5.4))."""
     b = bracket(x, u, k)
     return axpy(1.0 / 12.0, bracket(x, u, b), axpy(-0.5, b, k))
 
 
 @always_inline
 def stages(rate, p, t, x, h, k1):
-    """Return (end, u, e, k, last): state at t + h, step u in the algebra and its error e (theory.md, eq. (6.9)).
+    """Return (end, u, e, k, last): state at t + h, step u in the algebra and its error e (theory, eq. (6.9)).
 
     k is the tuple of pulled-back stages 1, 3, 4, 5, 6, 7 and last = h f(t + h, end). The argument k1 = h f(t, x) is
     `last` of the previous step.

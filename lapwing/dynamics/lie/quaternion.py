@@ -1,7 +1,7 @@
 """Attitude as a unit quaternion (w, x, y, z) that takes body coordinates to world coordinates.
 
 The tangent at an attitude is the angular velocity in body coordinates, omega_body [rad/s], so that
-q' = q * (0, omega_body) / 2 (theory.md, eq. (5.12)); q and -q are the same attitude.
+q' = q * (0, omega_body) / 2 (theory, eq. (5.12)); q and -q are the same attitude.
 """
 
 from typing import NamedTuple
@@ -70,7 +70,7 @@ def rotate_back(q, v_world):
 
 @always_inline
 def exp(v):
-    """Return the quaternion of the rotation vector v [rad] (theory.md, eq. (5.9))."""
+    """Return the quaternion of the rotation vector v [rad] (theory, eq. (5.9))."""
     square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
     if square < 2.5e-3:  # |v| < 0.05: the first omitted terms are below 1e-17
         s = 0.5 + square * (-1.0 / 48.0 + square * (1.0 / 3840.0 - square / 645120.0))
@@ -173,13 +173,13 @@ def normalise(q):
 
 @always_inline
 def bracket(u, v):
-    """Return the bracket with the sign for right tangents (theory.md, eq. (5.3)): -(u x v)."""
+    """Return the bracket with the sign for right tangents (theory, eq. (5.3)): -(u x v)."""
     return (u[2] * v[1] - u[1] * v[2], u[0] * v[2] - u[2] * v[0], u[1] * v[0] - u[0] * v[1])
 
 
 @always_inline
 def transport(u, v):
-    """Transport a tangent from q exp(u) back to q: half the rotation (theory.md, eq. (5.20))."""
+    """Transport a tangent from q exp(u) back to q: half the rotation (theory, eq. (5.20))."""
     return rotate(exp((0.5 * u[0], 0.5 * u[1], 0.5 * u[2])), v)
 
 

@@ -1,6 +1,6 @@
 """The even functions of an angle a [rad] in the exponential of a rotation and its derivatives, as functions of a^2.
 
-Near zero, where the closed forms divide zero by zero or cancel, each is its Taylor series (theory.md, eq. (5.5)).
+Near zero, where the closed forms divide zero by zero or cancel, each is its Taylor series (theory, eq. (5.5)).
 """
 
 from lapwing.kernels import always_inline, math
@@ -104,7 +104,7 @@ def cotangent_ratio(v):
 
 @always_inline
 def cosine_slope(square):
-    """Return d/d(a^2) of (1 - cos(a)) / a^2 (theory.md, eq. (5.18))."""
+    """Return d/d(a^2) of (1 - cos(a)) / a^2 (theory, eq. (5.18))."""
     if square < 1.0:
         return polynomial(COSINE_SLOPE, square)
     return (0.5 * sine_ratio(square) - cosine_ratio(square)) / square
@@ -112,7 +112,7 @@ def cosine_slope(square):
 
 @always_inline
 def cubic_slope(square):
-    """Return d/d(a^2) of (a - sin(a)) / a^3 (theory.md, eq. (5.18))."""
+    """Return d/d(a^2) of (a - sin(a)) / a^3 (theory, eq. (5.18))."""
     if square < 1.0:
         return polynomial(CUBIC_SLOPE, square)
     return 0.5 * (cosine_ratio(square) - 3.0 * cubic_ratio(square)) / square

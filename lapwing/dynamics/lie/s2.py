@@ -1,7 +1,7 @@
 """Directions: unit vectors, on which rotations act from the left.
 
 The tangent at a direction q is an angular velocity omega [rad/s] in the frame of q, orthogonal to q, so that
-q' = omega x q (theory.md, eq. (5.14)).
+q' = omega x q (theory, eq. (5.14)).
 """
 
 from typing import NamedTuple
@@ -22,7 +22,7 @@ class Direction(NamedTuple):
 
 @always_inline
 def retract(q, v):
-    """Return exp(hat(v)) q: the direction rotated by the rotation vector v [rad] (theory.md, eq. (5.15))."""
+    """Return exp(hat(v)) q: the direction rotated by the rotation vector v [rad] (theory, eq. (5.15))."""
     r = turn(v, q)
     # first-order normalisation, otherwise the rounding errors of many equal steps accumulate in the length
     return Direction(*scale(1.5 - 0.5 * dot(r, r), r))

@@ -29,7 +29,7 @@ class Pose(NamedTuple):
 
 @always_inline
 def exp(u):
-    """Return the rigid motion of u = (translation [m], rotation [rad]) (theory.md, eq. (5.16))."""
+    """Return the rigid motion of u = (translation [m], rotation [rad]) (theory, eq. (5.16))."""
     return Pose(so3.dexp(u[1], u[0]), quaternion.exp(u[1]))
 
 
@@ -42,7 +42,7 @@ def log(g):
 
 @always_inline
 def adjoint(g, u):
-    """Return Ad_g u, with g exp(u) = exp(Ad_g u) g (theory.md, eq. (5.17))."""
+    """Return Ad_g u, with g exp(u) = exp(Ad_g u) g (theory, eq. (5.17))."""
     rotation = rotate(g[1], u[1])
     return add(rotate(g[1], u[0]), cross(g[0], rotation)), rotation
 
@@ -55,7 +55,7 @@ def commutator(u, v):
 
 @always_inline
 def _along(linear, quadratic, quadratic_slope, linear_slope, u, v):
-    """Return the derivative along u[0] of linear w x v + quadratic w x (w x v) at w = u[1] (theory.md, eq. (5.19))."""
+    """Return the derivative along u[0] of linear w x v + quadratic w x (w x v) at w = u[1] (theory, eq. (5.19))."""
     b, w = u[0], u[1]
     doubled = 2.0 * dot(b, w)
     wv, bv = cross(w, v), cross(b, v)
@@ -66,7 +66,7 @@ def _along(linear, quadratic, quadratic_slope, linear_slope, u, v):
 
 @always_inline
 def dexp(u, v):
-    """Return dexp(u, v) on se(3), with exp(u)' = (dexp(u, u'))^ exp(u) (theory.md, eq. (5.19))."""
+    """Return dexp(u, v) on se(3), with exp(u)' = (dexp(u, u'))^ exp(u) (theory, eq. (5.19))."""
     square = dot(u[1], u[1])
     c, d = cosine_ratio(square), cubic_ratio(square)
     coupling = _along(c, d, cubic_slope(square), cosine_slope(square), u, v[1])
@@ -75,7 +75,7 @@ def dexp(u, v):
 
 @always_inline
 def dexpinv(u, v):
-    """Return the inverse of `dexp(u, .)`; singular at a rotation of 2 pi (theory.md, eq. (5.19))."""
+    """Return the inverse of `dexp(u, .)`; singular at a rotation of 2 pi (theory, eq. (5.19))."""
     coupling = _along(-0.5, cotangent_ratio(u[1]), cotangent_slope(u[1]), 0.0, u, v[1])
     return add(so3.dexpinv(u[1], v[0]), coupling), so3.dexpinv(u[1], v[1])
 
@@ -100,13 +100,13 @@ def normalise(g):
 
 @always_inline
 def bracket(u, v):
-    """Return the bracket with the sign for right tangents (theory.md, eq. (5.3)): -[u, v]."""
+    """Return the bracket with the sign for right tangents (theory, eq. (5.3)): -[u, v]."""
     return commutator(v, u)
 
 
 @always_inline
 def transport(u, v):
-    """Transport a tangent from g exp(u) back to g: Ad of exp(u/2), as on SO(3) (theory.md, eq. (5.20))."""
+    """Transport a tangent from g exp(u) back to g: Ad of exp(u/2), as on SO(3) (theory, eq. (5.20))."""
     return adjoint(exp((scale(0.5, u[0]), scale(0.5, u[1]))), v)
 
 

@@ -37,7 +37,7 @@ def vee(m):
 
 @always_inline
 def exp(v):
-    """Return the rotation matrix of the rotation vector v (theory.md, eq. (5.6))."""
+    """Return the rotation matrix of the rotation vector v (theory, eq. (5.6))."""
     square = dot(v, v)
     s, c = sine_ratio(square), cosine_ratio(square)
     sx, sy, sz = s * v[0], s * v[1], s * v[2]
@@ -64,7 +64,7 @@ def log(m):
 
 @always_inline
 def dexp(u, v):
-    """Return the derivative of the exponential: exp(u)' = hat(dexp(u, u')) exp(u) (theory.md, eq. (5.7))."""
+    """Return the derivative of the exponential: exp(u)' = hat(dexp(u, u')) exp(u) (theory, eq. (5.7))."""
     square = dot(u, u)
     across = cross(u, v)
     return add(v, add(scale(cosine_ratio(square), across), scale(cubic_ratio(square), cross(u, across))))
@@ -72,7 +72,7 @@ def dexp(u, v):
 
 @always_inline
 def dexpinv(u, v):
-    """Return the inverse of `dexp(u, .)`; singular at |u| = 2 pi (theory.md, eq. (5.8))."""
+    """Return the inverse of `dexp(u, .)`; singular at |u| = 2 pi (theory, eq. (5.8))."""
     across = cross(u, v)
     return add(v, add(scale(-0.5, across), scale(cotangent_ratio(u), cross(u, across))))
 

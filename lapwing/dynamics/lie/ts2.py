@@ -1,7 +1,7 @@
 """The tangent bundle of the sphere: a direction q with its angular velocity omega, q . omega = 0.
 
 SE(3) acts on it transitively from the left, (C, c) (q, omega) = (C q, C omega + c x C q), so that both constraints hold
-to round-off with any step (theory.md, eqs. (5.22) to (5.24); the action of the cooperative load).
+to round-off with any step (theory, eqs. (5.22) to (5.24); the action of the cooperative load).
 """
 
 from typing import NamedTuple
@@ -24,14 +24,14 @@ class Swing(NamedTuple):
 def tangent(x, acceleration):
     """Return the algebra element (mu_1, mu_2) of omega' = acceleration [rad/s^2], normal to the direction.
 
-    See theory.md, eq. (5.24).
+    See theory, eq. (5.24).
     """
     return x[1], cross(x[0], acceleration)
 
 
 @always_inline
 def act(rotation, shift, x):
-    """Return the action of the rigid motion (exp(rotation), shift) on x (theory.md, eq. (5.22))."""
+    """Return the action of the rigid motion (exp(rotation), shift) on x (theory, eq. (5.22))."""
     direction = so3.turn(rotation, x[0])
     return Swing(direction, add(so3.turn(rotation, x[1]), cross(shift, direction)))
 
@@ -51,7 +51,7 @@ def retract(x, mu):
 
 @always_inline
 def embed(x, mu):
-    """Return the derivative of the six numbers (theory.md, eq. (5.23))."""
+    """Return the derivative of the six numbers (theory, eq. (5.23))."""
     return cross(mu[0], x[0]), add(cross(mu[0], x[1]), cross(mu[1], x[0]))
 
 

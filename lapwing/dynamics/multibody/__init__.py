@@ -1,4 +1,4 @@
-"""Rigid bodies in redundant coordinates: joints and drives as constraints, solved on index 1 (theory.md, chapter 8).
+"""Rigid bodies in redundant coordinates: joints and drives as constraints, solved on index 1 (theory, chapter 8).
 
 General path, any mechanism in arrays: `system` (bodies and joints) -> `body_kinematics` (coordinates to poses) ->
 `constraints` (rows) -> `augmented` (accelerations and multipliers) -> `stabilisation`. Fast path, one core and four

@@ -1,6 +1,6 @@
 """Fast path: one core body and four leaves hinged to it at their centres of mass, without assembled matrices.
 
-The leaves are eliminated into the core's equations (theory.md, eqs. (8.40)-(8.45)), all four at once: every number of a
+The leaves are eliminated into the core's equations (theory, eqs. (8.40)-(8.45)), all four at once: every number of a
 `HingedBody` is a SIMD vector with one lane for each leaf. The remaining system is symmetric, 3x3. All vectors are in
 the same axes, which are arbitrary. A symmetric matrix is six numbers (xx, yy, zz, xy, xz, yz).
 """
@@ -132,7 +132,7 @@ def _sum(m):
 
 @always_inline
 def eliminate(core, leaf):
-    """Return accelerations of a core and its four leaves (theory.md, eqs. (8.44), (8.45))."""
+    """Return accelerations of a core and its four leaves (theory, eqs. (8.44), (8.45))."""
     drive = leaf.spins * (leaf.drive_torque + dot(leaf.axis, leaf.torque))
     force = subtract(leaf.force, scale(leaf.mass, leaf.drift))
     torque = subtract(leaf.torque, add(times(leaf.inertia, leaf.turn), scale(drive, leaf.axis)))

@@ -1,6 +1,6 @@
 """The augmented formulation: index-1 equations of motion solved for accelerations and multipliers together.
 
-M a = Q - J^T lambda, J a = gamma (theory.md, eq. (8.20)). With M = L L^T the accelerations are the shortest correction
+M a = Q - J^T lambda, J a = gamma (theory, eq. (8.20)). With M = L L^T the accelerations are the shortest correction
 of the free motion, computed by one pivoted QR of L^-1 J^T: redundant rows are dropped, accelerations stay unique, and
 the multipliers of minimum norm are returned.
 """
@@ -87,7 +87,7 @@ def divide_root_transposed(root, rotational, x):
 def generalised_force(a, p, wrench):
     """Return Q = Q_v + Q_e, shape (n, 6), of wrenches (n, 6): force [N], world; torque [N m], body.
 
-    See theory.md, eqs. (8.6), (8.18).
+    See theory, eqs. (8.6), (8.18).
     """
     out = np.empty((len(a.mass), 6))
     for b in range(len(a.mass)):
@@ -172,7 +172,7 @@ def accelerations(
     wrench: ArrayLike | None = None,
     drive: ArrayLike | None = None,
 ) -> Solution:
-    """Return accelerations of all coordinates, multipliers, rank and conflict (theory.md, eqs. (8.20)-(8.22)).
+    """Return accelerations of all coordinates, multipliers, rank and conflict (theory, eqs. (8.20)-(8.22)).
 
     Args:
         system: n bodies and d drives.

@@ -11,7 +11,7 @@ SINGULAR = 1e-6  # |cos(pitch)| below which the angles count as singular: their 
 
 @always_inline
 def rotation(angles):
-    """Return A of shape (3, 3), body to world (theory.md, eq. (8.1))."""
+    """Return A of shape (3, 3), body to world (theory, eq. (8.1))."""
     sx, cx = math.sincos(angles[0])
     sy, cy = math.sincos(angles[1])
     sz, cz = math.sincos(angles[2])
@@ -24,7 +24,7 @@ def rotation(angles):
 
 @always_inline
 def rate_matrix(angles):
-    """Return G-bar: omega_body = G-bar d(angles)/dt (theory.md, eq. (8.2)); its determinant is cos(pitch)."""
+    """Return G-bar: omega_body = G-bar d(angles)/dt (theory, eq. (8.2)); its determinant is cos(pitch)."""
     sy, cy = math.sincos(angles[1])
     sz, cz = math.sincos(angles[2])
     return (cy * cz, sz, 0.0, -cy * sz, cz, 0.0, sy, 0.0, 1.0)
@@ -32,7 +32,7 @@ def rate_matrix(angles):
 
 @always_inline
 def rate_matrix_derivative(angles, rates):
-    """Return d(G-bar)/dt for angle rates [rad/s] (theory.md, eq. (8.3))."""
+    """Return d(G-bar)/dt for angle rates [rad/s] (theory, eq. (8.3))."""
     sy, cy = math.sincos(angles[1])
     sz, cz = math.sincos(angles[2])
     dy, dz = rates[1], rates[2]
@@ -45,13 +45,13 @@ def rate_matrix_derivative(angles, rates):
 
 @always_inline
 def rotational_mass(G, inertia):
-    """Return G-bar^T I G-bar, the rotational block of the mass matrix (theory.md, eq. (8.5))."""
+    """Return G-bar^T I G-bar, the rotational block of the mass matrix (theory, eq. (8.5))."""
     return matmul(transpose(G), matmul(inertia, G))
 
 
 @always_inline
 def quadratic_velocity(G, inertia, omega_body, bias):
-    """Return -G-bar^T (omega x I omega + I bias) with bias = d(G-bar)/dt d(angles)/dt (theory.md, eq. (8.6))."""
+    """Return -G-bar^T (omega x I omega + I bias) with bias = d(G-bar)/dt d(angles)/dt (theory, eq. (8.6))."""
     gyroscopic = cross(omega_body, apply(inertia, omega_body))
     total = add(gyroscopic, apply(inertia, bias))
     return apply_transposed(G, (-total[0], -total[1], -total[2]))
@@ -59,13 +59,13 @@ def quadratic_velocity(G, inertia, omega_body, bias):
 
 @always_inline
 def angles_of(R):
-    """Return (roll, pitch, yaw) of a rotation matrix, pitch in [-pi/2, pi/2] (theory.md, eq. (8.4))."""
+    """Return (roll, pitch, yaw) of a rotation matrix, pitch in [-pi/2, pi/2] (theory, eq. (8.4))."""
     return (math.atan2(-R[5], R[8]), math.atan2(R[2], math.hypot(R[0], R[1])), math.atan2(-R[1], R[0]))
 
 
 @always_inline
 def rates_of(angles, omega_body):
-    """Return d(angles)/dt [rad/s] of an angular velocity; divides by cos(pitch) (theory.md, eq. (8.4))."""
+    """Return d(angles)/dt [rad/s] of an angular velocity; divides by cos(pitch) (theory, eq. (8.4))."""
     sy, cy = math.sincos(angles[1])
     sz, cz = math.sincos(angles[2])
     roll = (cz * omega_body[0] - sz * omega_body[1]) / cy

@@ -25,7 +25,7 @@ class Equations(NamedTuple):
 
 @kernel
 def _revolute(a, p, k, out):
-    """Write the rows of joint k (theory.md, eqs. (8.10)-(8.13))."""
+    """Write the rows of joint k (theory, eqs. (8.10)-(8.13))."""
     i, j = a.joint_bodies[k]
     r = 5 * k
     Ri, Rj, wi, wj = nine(p.rotation, i), nine(p.rotation, j), three(p.omega, i), three(p.omega, j)
@@ -66,7 +66,7 @@ def _revolute(a, p, k, out):
 
 @kernel
 def _drive(a, p, k, speed, acceleration, out):
-    """Write the rows of drive k (theory.md, eqs. (8.15)-(8.17))."""
+    """Write the rows of drive k (theory, eqs. (8.15)-(8.17))."""
     i, j = a.drive_bodies[k]
     r = 5 * len(a.joint_bodies) + 3 * k
     Ri, Rj = nine(p.rotation, i), nine(p.rotation, j)
@@ -99,7 +99,7 @@ def equations(a, p, drive):
 def in_coordinates(e, p):
     """Return the rows for the coordinates' rates, without ground columns: J <- J G, gamma <- gamma - J bias.
 
-    See theory.md, eq. (8.14); rows for quaternions, whose velocities are the twists, are unchanged.
+    See theory, eq. (8.14); rows for quaternions, whose velocities are the twists, are unchanged.
     """
     n = len(p.rate_matrix)
     Jt = e.jacobian_t[: 6 * n]

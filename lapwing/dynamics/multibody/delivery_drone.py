@@ -159,7 +159,7 @@ def _propellers(d, x, loads, g):
 
 @always_inline
 def motion(d, loads, x):
-    """Return accelerations and reactions of a drone under loads in a state (theory.md, eqs. (8.40)-(8.45), (8.50))."""
+    """Return accelerations and reactions of a drone under loads in a state (theory, eqs. (8.40)-(8.45), (8.50))."""
     R = quaternion.rotation_matrix(x.attitude)
     g = apply_transposed(R, loads.gravity_world)
     w = x.omega_body

@@ -117,7 +117,7 @@ def free_turn(axis, gamma_1, gamma_2):
 
 @always_inline
 def _baumgarte_feedback(rate, r, speed, x, chassis, R0, axis, own):
-    """Return (drift, turn) of Baumgarte's feedback at `rate` [1/s] of a hinge's defect (theory.md, eq. (8.30))."""
+    """Return (drift, turn) of Baumgarte's feedback at `rate` [1/s] of a hinge's defect (theory, eq. (8.30))."""
     w, back = chassis.omega_body, rate * rate
     gap = subtract(apply_transposed(R0, subtract(x.position_world, chassis.position_world)), r.offset)
     opening = subtract(apply_transposed(R0, subtract(x.velocity_world, chassis.velocity_world)), cross(w, r.offset))
@@ -171,7 +171,7 @@ def solve(p, t, x):
 
 @always_inline
 def rate(p, t, x):
-    """Return the tangent of the state: index-1 equations of motion by elimination (theory.md, eqs. (8.40)-(8.46))."""
+    """Return the tangent of the state: index-1 equations of motion by elimination (theory, eqs. (8.40)-(8.46))."""
     s, R0, C = solve(p, t, x)
     r, b = interleave(p.rotors), interleave(x.propellers)
     acceleration = apply(R0, s.acceleration)

@@ -90,7 +90,7 @@ def _core(p, force, torque):
 
 @always_inline
 def project(p, t, x):
-    """Project to the nearest consistent state in the metric of the masses (theory.md, eqs. (8.31), (8.32)).
+    """Project to the nearest consistent state in the metric of the masses (theory, eqs. (8.31), (8.32)).
 
     One Newton step on position level, then the velocities: a drift of e leaves e^2.
     """
@@ -120,7 +120,7 @@ def project(p, t, x):
 
 @always_inline
 def partition(p, t, x):
-    """Compute all dependent coordinates from chassis pose, spin angles and their rates (theory.md, eq. (8.33))."""
+    """Compute all dependent coordinates from chassis pose, spin angles and their rates (theory, eq. (8.33))."""
     c = x.chassis
     c = BodyState(c.position_world, quaternion.normalise(c.attitude), c.velocity_world, c.omega_body)
     R0, r, b = quaternion.rotation_matrix(c.attitude), interleave(p.rotors), interleave(x.propellers)

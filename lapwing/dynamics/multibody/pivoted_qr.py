@@ -180,7 +180,7 @@ def _solve_positive(m, x):
 
 @noinline
 def minimum_norm(f, z):
-    """Return the shortest x of shape (m,) with B x = y, given z = Q^T y (theory.md, eq. (8.22))."""
+    """Return the shortest x of shape (m,) with B x = y, given z = Q^T y (theory, eq. (8.22))."""
     m = len(f.order)
     r, free = f.rank, m - f.rank
     # column 0: the basic solution; the others: minus the null space's upper part, R11^-1 R12

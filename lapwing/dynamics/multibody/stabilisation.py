@@ -1,4 +1,4 @@
-"""Projection of a state onto its constraints, on position and velocity level (theory.md, section 8.6).
+"""Projection of a state onto its constraints, on position and velocity level (theory, section 8.6).
 
 `project` applies the smallest correction in the metric of the masses. `partition` keeps the independent
 coordinates and velocities that the integration produced and solves for the dependent ones: the paper's
@@ -61,7 +61,7 @@ def _tolerance(e):
 
 @noinline
 def project(a, configuration, velocity, drive, ranks):
-    """Return the nearest consistent state in the metric of the mass matrix (theory.md, eqs. (8.31), (8.32)).
+    """Return the nearest consistent state in the metric of the mass matrix (theory, eqs. (8.31), (8.32)).
 
     `ranks`: upper bounds of the rank of the holonomic rows and of all rows.
     """
@@ -104,7 +104,7 @@ def _correction(jacobian, mask, defect, tolerance, most):
 
 @noinline
 def partition(a, configuration, velocity, drive, ranks):
-    """Correct the dependent coordinates by generalised coordinate partitioning (theory.md, eqs. (8.33), (8.34)).
+    """Correct the dependent coordinates by generalised coordinate partitioning (theory, eqs. (8.33), (8.34)).
 
     Column pivoting of the Jacobian selects the dependent coordinates, which Newton's iteration corrects; then the
     velocities. See `project` for `ranks`.

@@ -26,7 +26,7 @@ class Body:
 
 @dataclass(frozen=True)
 class Revolute:
-    """A hinge between bodies i and j (theory.md, eq. (8.10)): five holonomic equations.
+    """A hinge between bodies i and j (theory, eq. (8.10)): five holonomic equations.
 
     Points [m] and axes (any length) are in the body's own coordinates, shape (3,); for the ground: in the world frame.
     """
@@ -44,7 +44,7 @@ class Revolute:
 class DrivingConstraint:
     """Imposed angular velocity of body i relative to body j about an axis fixed in body j.
 
-    Three nonholonomic equations (theory.md, eq. (8.15)).
+    Three nonholonomic equations (theory, eq. (8.15)).
     """
 
     name: str

@@ -1,6 +1,6 @@
 """Terrain: level ground or a relief. The kind is known when a kernel is compiled, so level ground has no cost.
 
-`relief` creates one from a slope, bumps, steps, a grid of heights, boxes and cylinders (theory.md, section 2.9).
+`relief` creates one from a slope, bumps, steps, a grid of heights, boxes and cylinders (theory, section 2.9).
 """
 
 from lapwing.dynamics.terrain.heightfield import Relief, ray

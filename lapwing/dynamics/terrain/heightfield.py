@@ -36,7 +36,7 @@ def _cubic(a, b, c, d, p):
 
 @noinline
 def _between(t, x, y):
-    """Return (height, slope along x, slope along y) of the grid by cubic convolution (theory.md, eq. (2.82)).
+    """Return (height, slope along x, slope along y) of the grid by cubic convolution (theory, eq. (2.82)).
 
     Outside, the slope at the edge decreases linearly to 0 within one spacing.
     """
@@ -198,7 +198,7 @@ def _among_obstacles(t, ground, place):
 
 @kernel
 def depth(t, place):
-    """Return (depth [m] of a point, not positive outside; normal; wedge factor): theory.md, eq. (2.80) and (2.81)."""
+    """Return (depth [m] of a point, not positive outside; normal; wedge factor): theory, eq. (2.80) and (2.81)."""
     height, a, b = field(t, place[0], place[1])
     normal = _normal(a, b)
     ground = ((height - place[2]) * normal[2], normal, 1.0)

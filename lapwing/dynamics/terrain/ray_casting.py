@@ -1,4 +1,4 @@
-"""Exact intersections of rays with the ground and its obstacles, for many rays (theory.md, eq. (3.52))."""
+"""Exact intersections of rays with the ground and its obstacles, for many rays (theory, eq. (3.52))."""
 
 import numpy as np
 

@@ -28,7 +28,7 @@ def relief(
     corner: tuple[float, float] = (0.0, 0.0),
     spacing: float = 1.0,
 ) -> Level | Relief:
-    """Return the combined terrain; level ground without any feature (theory.md, eq. (2.30)). Lengths in m.
+    """Return the combined terrain; level ground without any feature (theory, eq. (2.30)). Lengths in m.
 
     Args:
         slope: rise along world x and y.

@@ -64,7 +64,7 @@ def touch(terrain: Any, place_world: Vec3) -> tuple[float, Vec3, float]:
     """Return (depth [m] of a point in the ground, not positive in the air; normal; wedge factor).
 
     The depth is the distance to the nearest point outside, and the normal points there. The wedge factor is the sum of
-    the normal forces of all faces over their resultant: 1, and more in inner corners (theory.md, section 2.9).
+    the normal forces of all faces over their resultant: 1, and more in inner corners (theory, section 2.9).
     """
     return (-place_world[2], UP, 1.0) if isinstance(terrain, Level) else depth(terrain, place_world)
 

@@ -70,7 +70,7 @@ class Airframe(Section):
 
     @property
     def loaded(self) -> "Airframe":
-        """Airframe with the box of [payload] included in its mass (theory.md, eq. (2.41))."""
+        """Airframe with the box of [payload] included in its mass (theory, eq. (2.41))."""
         box, own = self.payload, self.mass
         if box is None or own.payload:
             return self

@@ -25,7 +25,7 @@ class Section(BaseModel):
 
 
 class Mass(Section):
-    """Mass properties with payload, about the centre of mass and along the body axes (theory.md, eq. (1.6a)).
+    """Mass properties with payload, about the centre of mass and along the body axes (theory, eq. (1.6a)).
 
     With a separate payload table, these are the properties of the vehicle without payload.
     """
@@ -115,7 +115,7 @@ class RotorPlacement(Section):
 
 
 class Propeller(Section):
-    """Geometry and blade-element constants of theory.md, eq. (1.9) to (1.11)."""
+    """Geometry and blade-element constants of theory, eq. (1.9) to (1.11)."""
 
     diameter: Annotated[float, Ge(1e-3), Le(100)]  # [m] D
     pitch: Annotated[float, Ge(1e-6), Le(100)]  # [m] advance per turn without slip
@@ -161,7 +161,7 @@ class Motor(Section):
 
     @property
     def rotor_constant(self) -> float:
-        """Motor constant [N m/A] = [V s/rad] of motor and belt, at the rotor (theory.md, eq. (1.12))."""
+        """Motor constant [N m/A] = [V s/rad] of motor and belt, at the rotor (theory, eq. (1.12))."""
         return 30.0 / (math.pi * self.speed_constant * self.gear_ratio)
 
 

@@ -1,6 +1,6 @@
 """Three controllers for the cooperative load: load tracking, link directions, attitudes (Lee, Sreenath, Kumar 2013).
 
-Pure: (p, t, x) -> LiftCommand, for the control service and the closed loop alike (theory.md, eqs. (7.22) to (7.27)).
+Pure: (p, t, x) -> LiftCommand, for the control service and the closed loop alike (theory, eqs. (7.22) to (7.27)).
 """
 
 from typing import NamedTuple
@@ -29,7 +29,7 @@ class FormationControl(NamedTuple):
 
 @kernel
 def formation_control(p, t, x):
-    """Return thrusts and moments of all quadrotors at time t (theory.md, eqs. (7.22) to (7.27))."""
+    """Return thrusts and moments of all quadrotors at time t (theory, eqs. (7.22) to (7.27))."""
     desired, slope = forces.desired_specific_force(p, t, x, (0.0, 0.0, 0.0))
     s, s_rate = forces.shares(p, x, desired, slope)
     thrust = map_index(forces.quad_thrust, x.link, p, x, desired, slope, s, s_rate)

@@ -1,6 +1,6 @@
 """Desired force and moment of each quadrotor of a formation.
 
-Lee, Sreenath, Kumar (CDC 2013); theory.md, eqs. (7.22) to (7.27). `p.drive` is a FormationControl.
+Lee, Sreenath, Kumar (CDC 2013); theory, eqs. (7.22) to (7.27). `p.drive` is a FormationControl.
 """
 
 import math
@@ -25,7 +25,7 @@ from lapwing.kernels import always_inline, kernel
 UPRIGHT_SHARE = 0.3  # smallest vertical force of the desired attitude, relative to a quadrotor's weight
 NOTHING = (0.0, 0.0, 0.0)
 FORWARD = (1.0, 0.0, 0.0)  # heading of all quadrotors
-SHARE_DAMPING = 0.03  # keeps the shares bounded if the links do not span space (theory.md, eq. (7.23))
+SHARE_DAMPING = 0.03  # keeps the shares bounded if the links do not span space (theory, eq. (7.23))
 
 
 @always_inline
@@ -72,7 +72,7 @@ def shares(p, x, desired, slope):
 
 @kernel
 def desired_force(p, x, desired, slope, s, s_rate, omega_rate, i):
-    """Return the desired world force [N] of quadrotor i, and its derivative (theory.md, eqs. (7.24) and (7.25))."""
+    """Return the desired world force [N] of quadrotor i, and its derivative (theory, eqs. (7.24) and (7.25))."""
     c = p.drive
     q, omega = x.link[i].direction, x.link[i].omega
     m, inertia = p.quad_mass[i], p.quad_mass[i] * p.link_length[i]
@@ -124,7 +124,7 @@ def desired_attitude(force, force_rate):
 
 @kernel
 def moment(p, x, force, force_rate, i):
-    """Return the moment [N m] that aligns body z with the desired force (theory.md, eq. (7.27))."""
+    """Return the moment [N m] that aligns body z with the desired force (theory, eq. (7.27))."""
     c = p.drive
     limited, kept_rate = upright(force, force_rate, UPRIGHT_SHARE * p.quad_mass[i] * p.gravity)
     desired, desired_omega = desired_attitude(limited, kept_rate)

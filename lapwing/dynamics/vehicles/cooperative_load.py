@@ -1,7 +1,7 @@
 """N quadrotors carrying a point mass by rigid massless links, on R^6 x (TSO(3))^N x (TS^2)^N, N >= 2.
 
 The model of Lee, Sreenath and Kumar (CDC 2013) in ENU: a link's direction points from its quadrotor to the load. The
-equations are theory.md, eqs. (7.17) to (7.21); the constraints are part of the state space and cannot drift.
+equations are theory, eqs. (7.17) to (7.21); the constraints are part of the state space and cannot drift.
 """
 
 from typing import Any, NamedTuple
@@ -108,7 +108,7 @@ def thrust_world(x, thrust, i):
 
 @kernel
 def load_acceleration(p, x, force):
-    """Return v' - a_g of the load: M_q (v' - a_g) = sum of (q . u - m L |omega|^2) q (theory.md, eq. (7.19))."""
+    """Return v' - a_g of the load: M_q (v' - a_g) = sum of (q . u - m L |omega|^2) q (theory, eq. (7.19))."""
     matrix = (p.load_mass, 0.0, 0.0, 0.0, p.load_mass, 0.0, 0.0, 0.0, p.load_mass)
     pull = (0.0, 0.0, 0.0)
     for i in range(len(force)):
@@ -121,7 +121,7 @@ def load_acceleration(p, x, force):
 
 @always_inline
 def link_acceleration(p, x, force, specific, i):
-    """Return omega' of link i [rad/s^2]: L omega' = q x (v' - a_g - u / m) (theory.md, eq. (7.20))."""
+    """Return omega' of link i [rad/s^2]: L omega' = q x (v' - a_g - u / m) (theory, eq. (7.20))."""
     relative = subtract(specific, scale(1.0 / p.quad_mass[i], force[i]))
     return scale(1.0 / p.link_length[i], cross(x.link[i].direction, relative))
 
@@ -133,14 +133,14 @@ def _link_rate(p, x, force, specific, i):
 
 @always_inline
 def body_rate(p, x, lift, i):
-    """Return the angular acceleration [rad/s^2] of quadrotor i under a LiftCommand (theory.md, eq. (7.18))."""
+    """Return the angular acceleration [rad/s^2] of quadrotor i under a LiftCommand (theory, eq. (7.18))."""
     inertia, o = p.quad_inertia[i], x.omega_body[i]
     return divide(add(lift.moment_body[i], cross(multiply(inertia, o), o)), inertia)
 
 
 @kernel
 def rate(p, t, x):
-    """Return the tangent of the whole system (theory.md, eqs. (7.18) to (7.21))."""
+    """Return the tangent of the whole system (theory, eqs. (7.18) to (7.21))."""
     lift = command(p, t, x)
     force = map_index(thrust_world, x.link, x, lift.thrust)
     specific = load_acceleration(p, x, force)
@@ -170,7 +170,7 @@ def quad_velocity(p, x, i):
 
 @kernel
 def energy(p, x):
-    """Return kinetic and potential energy [J] (theory.md, eq. (7.17))."""
+    """Return kinetic and potential energy [J] (theory, eq. (7.17))."""
     total = 0.5 * p.load_mass * dot(x.load_velocity, x.load_velocity) + p.load_mass * p.gravity * x.load_position[2]
     for i in range(len(x.link)):
         v, o = quad_velocity(p, x, i), x.omega_body[i]

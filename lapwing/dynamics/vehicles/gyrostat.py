@@ -1,6 +1,6 @@
 """Gyrostat satellite: a rigid platform with three rotors along its principal axes, the third spinning unevenly.
 
-Lagrange-d'Alembert on SO(3) gives theory.md, eq. (7.7); after Ge and Lin, J. Sound Vib. 251 (2002) 519, whose numbers
+Lagrange-d'Alembert on SO(3) gives theory, eq. (7.7); after Ge and Lin, J. Sound Vib. 251 (2002) 519, whose numbers
 use minutes in place of seconds. Zero parameters give the simpler cases: rotors at rest, no damping, no feedback.
 """
 
@@ -38,7 +38,7 @@ class GyrostatParameters(NamedTuple):
 
 @always_inline
 def rotor_momentum(p, t):
-    """Return the momentum of the rotors and its derivative, both in the body (theory.md, eq. (7.6))."""
+    """Return the momentum of the rotors and its derivative, both in the body (theory, eq. (7.6))."""
     h, w = p.rotor_momentum, p.forcing_frequency
     sine, cosine = math.sincos(w * t)
     momentum = (h[0], h[1], h[2] * (1.0 + p.forcing_amplitude * cosine))
@@ -47,7 +47,7 @@ def rotor_momentum(p, t):
 
 @always_inline
 def attitude_torque(p, x):
-    """Return the proportional-derivative control on SO(3) towards the target (theory.md, eq. (7.9))."""
+    """Return the proportional-derivative control on SO(3) towards the target (theory, eq. (7.9))."""
     error = log(multiply(conjugate(p.target), x.attitude))
     return add(scale(-p.attitude_gain, error), scale(-p.rate_gain, x.omega_body))
 

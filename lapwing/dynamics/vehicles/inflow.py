@@ -1,4 +1,4 @@
-"""Induced velocity of a rotor by momentum theory, with its fit to measurements in descent (theory.md, eq. (2.35))."""
+"""Induced velocity of a rotor by momentum theory, with its fit to measurements in descent (theory, eq. (2.35))."""
 
 import math
 
@@ -55,7 +55,7 @@ def induced_velocity(climb, across, kappa):
 def thrust_in_wake(pitch, wash):
     """Return the thrust of a rotor in the contracted wake of another one, over its isolated thrust; 0 to 1.
 
-    See theory.md, eqs. (2.43) and (2.44).
+    See theory, eqs. (2.43) and (2.44).
 
     Args:
         pitch: blade advance per radian over the isolated induced velocity in hover per radian per second; above 1.

@@ -1,6 +1,6 @@
 """Equations of motion of a multirotor under the effects of its scene.
 
-This module has only kinematics, Newton's and Euler's equations and the lag of the rotors (theory.md, chapter 1);
+This module has only kinematics, Newton's and Euler's equations and the lag of the rotors (theory, chapter 1);
 every force is an effect (lapwing/dynamics/effects). All functions are pure. The representation of the motion in the
 state is a form (`FORMS`): here one rigid body; other modules add forms with the same effects and steps.
 """
@@ -104,7 +104,7 @@ def _lag(s, speed, voltage):
 
 @always_inline
 def _static_current(s, torque, voltage):
-    """Return the current that balances the aerodynamic torque (theory.md, eq. (1.14)); 0 with the controller off."""
+    """Return the current that balances the aerodynamic torque (theory, eq. (1.14)); 0 with the controller off."""
     return torque / s.layout.volt_per_speed + s.layout.no_load_current if voltage > 0.0 else 0.0
 
 
@@ -149,7 +149,7 @@ def evaluate(drive, t, motion):
 
 @always_inline
 def rate(drive, t, motion):
-    """Return the tangent of the motion: Newton's and Euler's equations (theory.md, eq. (1.3) to (1.6))."""
+    """Return the tangent of the motion: Newton's and Euler's equations (theory, eq. (1.3) to (1.6))."""
     s, rotors, force, torque = evaluate(drive, t, motion)
     linear, angular = newton_euler(s.body, drive, s, force, torque)
     return Motion(motion.velocity_world, motion.omega_body, linear, angular, rotors.acceleration)

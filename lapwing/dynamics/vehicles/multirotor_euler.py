@@ -163,7 +163,7 @@ def motion_of(layout, x):
 
 @noinline
 def rate(drive, t, x):
-    """Return the tangent by the augmented formulation (theory.md, eqs. (8.20)-(8.22)), which divides by cos(pitch)."""
+    """Return the tangent by the augmented formulation (theory, eqs. (8.20)-(8.22)), which divides by cos(pitch)."""
     if not _all_upright(x):
         b = x.body
         return FiveEulerBodies(

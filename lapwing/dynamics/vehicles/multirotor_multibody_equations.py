@@ -1,7 +1,7 @@
 """Equations of motion of a multirotor of five bodies, and the forces in its hinges.
 
 A form of the multirotor's state: each body has its own pose on SE(3), and the arrowhead structure is eliminated
-(theory.md, eqs. (8.40)-(8.46)). The bodies include `gyroscopic_torque`, and mass properties that the reduced model
+(theory, eqs. (8.40)-(8.46)). The bodies include `gyroscopic_torque`, and mass properties that the reduced model
 averages over a turn.
 """
 

@@ -1,4 +1,4 @@
-"""Multirotor with a point mass on a massless cable, under the effects of its scene (theory.md, section 1.5).
+"""Multirotor with a point mass on a massless cable, under the effects of its scene (theory, section 1.5).
 
 A form of `multirotor`'s state. The cable is a spring with a damper that can only pull. The force when it becomes taut
 is bounded by its stiffness, while a rigid cable would need an impulse. Cables of steel or aramid are elastic, too;
@@ -112,7 +112,7 @@ def load_acceleration(sling, field, air, pull, x):
 
 @kernel
 def rate(drive, t, x):
-    """Return the tangent of vehicle and load (theory.md, eqs. (1.20) to (1.22))."""
+    """Return the tangent of vehicle and load (theory, eqs. (1.20) to (1.22))."""
     sling = drive.parameters.layout.bodies
     s, rotors, force, torque = evaluate(drive, t, x.vehicle)
     pull, turn = cable(sling, s.R_world_body, x)

@@ -138,7 +138,7 @@ FORMS[AwakeState] = StateForm(_wake, _awake_rate, _project_awake, _awake_acceler
 
 @always_inline
 def _growth(error, allowed):
-    """Return the length of the next substep over that of the last (theory.md, eq. (2.33))."""
+    """Return the length of the next substep over that of the last (theory, eq. (2.33))."""
     return min(max(0.9 * math.sqrt(math.sqrt(allowed / max(error, 1e-3 * allowed))), 0.1), 2.0)
 
 
@@ -150,7 +150,7 @@ def _origin(x, t):
 
 @never_inlined
 def _stiff_steps(method, drive, t, x, h, end):
-    """Return (motion, memory) at the time `end` by step doubling (theory.md, eq. (2.33)).
+    """Return (motion, memory) at the time `end` by step doubling (theory, eq. (2.33)).
 
     Each substep is taken whole and in halves, with the effects' memories that have a rate; the difference is the error.
     The result of the halves is kept; they are no longer than h and than effects require. Compensated sums include the

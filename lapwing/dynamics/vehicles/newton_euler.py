@@ -1,4 +1,4 @@
-"""Newton's and Euler's equations of one rigid body, selected by the class of its mass properties (theory.md, 1.1)."""
+"""Newton's and Euler's equations of one rigid body, selected by the class of its mass properties (theory, 1.1)."""
 
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.effects._types import FullMassProperties, OffsetMassProperties

@@ -1,7 +1,7 @@
 """Steady-flight performance of a multirotor, from the models that the plant integrates.
 
-Steady level flight balances weight, drag of fuselage (theory.md, eq. (2.7)) and rotors (eq. (2.11)), and the thrust of
-equal rotors with axial inflow (eq. (2.5)); the motors' voltage and current follow from the torque (theory.md, section
+Steady level flight balances weight, drag of fuselage (theory, eq. (2.7)) and rotors (eq. (2.11)), and the thrust of
+equal rotors with axial inflow (eq. (2.5)); the motors' voltage and current follow from the torque (theory, section
 1.4). For tilted rotors the sum of their thrusts and their mean axial inflow count; for coaxial rotors the loss of the
 lower ones (eq. (2.44)), with all rotors at one speed.
 """
@@ -208,7 +208,7 @@ def maximum_tilt(airframe: Airframe, density: float = DENSITY, rotor: Rotor | No
 
 
 def ceiling(airframe: Airframe, air: Atmosphere = STANDARD.atmosphere, rotor: Rotor | None = None) -> float:
-    """Return the altitude [m] at which the maximum thrust equals the weight (theory.md, eq. (2.3)).
+    """Return the altitude [m] at which the maximum thrust equals the weight (theory, eq. (2.3)).
 
     Raises:
         ValueError: the thrust does not depend on the density.

@@ -1,4 +1,4 @@
-"""Thrust and torque coefficients of a propeller from its geometry (theory.md, eq. (1.9) to (1.11))."""
+"""Thrust and torque coefficients of a propeller from its geometry (theory, eq. (1.9) to (1.11))."""
 
 from typing import TYPE_CHECKING
 
@@ -16,14 +16,14 @@ def blade_angle(propeller: "Propeller") -> float:
 
 
 def thrust_coefficient(propeller: "Propeller") -> float:
-    """Return C_T: thrust over density times (revolutions per second)^2 times diameter^4 (theory.md, eq. (1.9))."""
+    """Return C_T: thrust over density times (revolutions per second)^2 times diameter^4 (theory, eq. (1.9))."""
     lift = propeller.lift_curve_slope * blade_angle(propeller) / propeller.aspect_ratio
     blades = propeller.lift_correction * math.square(propeller.radius_weight) * propeller.blades
     return 0.25 * math.square(math.pi) * blades * lift
 
 
 def drag_coefficients(propeller: "Propeller") -> tuple[float, float]:
-    """Return (zero-lift, lift-induced) drag coefficients of the blade section (theory.md, eq. (1.11))."""
+    """Return (zero-lift, lift-induced) drag coefficients of the blade section (theory, eq. (1.11))."""
     lift = propeller.lift_curve_slope * blade_angle(propeller)
     induced = lift * lift / (math.pi * propeller.aspect_ratio * propeller.oswald_factor)
     return propeller.zero_lift_drag, induced
@@ -83,13 +83,13 @@ def from_stand(
 
 
 def h_force_coefficient(propeller: "Propeller") -> float:
-    """Return the in-plane drag coefficient [m^3/rad] over density, rotor speed and velocity (theory.md, eq. (2.11))."""
+    """Return the in-plane drag coefficient [m^3/rad] over density, rotor speed and velocity (theory, eq. (2.11))."""
     radius = 0.5 * propeller.diameter
     blade_area = propeller.blades * radius * propeller.diameter / propeller.aspect_ratio
     return blade_area * math.total(drag_coefficients(propeller)) * radius / 4.0
 
 
 def torque_coefficient(propeller: "Propeller") -> float:
-    """Return C_M: torque over density times (revolutions per second)^2 times diameter^5 (theory.md, eq. (1.10))."""
+    """Return C_M: torque over density times (revolutions per second)^2 times diameter^5 (theory, eq. (1.10))."""
     blades = propeller.lift_correction * math.square(propeller.radius_weight * propeller.blades)
     return math.square(math.pi) * blades * math.total(drag_coefficients(propeller)) / (8.0 * propeller.aspect_ratio)

@@ -1,4 +1,4 @@
-"""A communication step in which propellers fail: it is split at the times of the failures (theory.md, section 6.8)."""
+"""A communication step in which propellers fail: it is split at the times of the failures (theory, section 6.8)."""
 
 import math
 from typing import Any, NamedTuple

@@ -1,6 +1,6 @@
 """OS4 quadrotor on SO(3): rotor 1 on +x, 2 on +y, 3 on -x, 4 on -y; 1 and 3 turn clockwise seen from above.
 
-Lagrange-d'Alembert gives theory.md, eqs. (7.11) to (7.14), with the gyroscopic term of the residual rotor speed. Rotors
+Lagrange-d'Alembert gives theory, eqs. (7.11) to (7.14), with the gyroscopic term of the residual rotor speed. Rotors
 keep their speed, or follow their motors' voltages if there are motors.
 """
 
@@ -48,7 +48,7 @@ class Os4State(NamedTuple):
 
 
 def hover_speed(p: Os4Parameters) -> float:
-    """Return the rotor speed [rad/s] at which four thrusts balance the weight (theory.md, eq. (7.15))."""
+    """Return the rotor speed [rad/s] at which four thrusts balance the weight (theory, eq. (7.15))."""
     return math.sqrt(p.mass * p.gravity / (4.0 * p.lift_constant))
 
 
@@ -74,7 +74,7 @@ def rotor_acceleration(p, motors, speed):
 
 @always_inline
 def rotor_loads(p, speed):
-    """Return (thrust [N] along body z, torque [N m] in the body) of the rotors (theory.md, eq. (7.11))."""
+    """Return (thrust [N] along body z, torque [N m] in the body) of the rotors (theory, eq. (7.11))."""
     w1, w2, w3, w4 = speed[0] * speed[0], speed[1] * speed[1], speed[2] * speed[2], speed[3] * speed[3]
     lever = p.arm * p.lift_constant
     return p.lift_constant * (w1 + w2 + w3 + w4), (
@@ -100,7 +100,7 @@ def net_force(p, x):
 
 @always_inline
 def rate(p, t, x):
-    """Return the tangent: Newton and Euler with the rotors' momentum (theory.md, eqs. (7.12) and (7.13))."""
+    """Return the tangent: Newton and Euler with the rotors' momentum (theory, eqs. (7.12) and (7.13))."""
     o = x.omega_body
     _, torque = rotor_loads(p, x.rotor_speed)
     acceleration = rotor_acceleration(p, p.motors, x.rotor_speed)

@@ -1,4 +1,4 @@
-"""Quadrotors and a released load as free bodies (theory.md, eq. (7.29))."""
+"""Quadrotors and a released load as free bodies (theory, eq. (7.29))."""
 
 from typing import NamedTuple
 
@@ -50,7 +50,7 @@ def _acceleration(p, x, i):
 
 @always_inline
 def rate(p, t, x):
-    """Return the tangent of the free bodies (theory.md, eqs. (7.18) and (7.29))."""
+    """Return the tangent of the free bodies (theory, eqs. (7.18) and (7.29))."""
     return ReleasedLoadState(
         x.load_velocity,
         (0.0, 0.0, -p.gravity),

@@ -1,4 +1,4 @@
-"""Free rigid body: Euler's equations about principal axes (theory.md, eq. (7.1))."""
+"""Free rigid body: Euler's equations about principal axes (theory, eq. (7.1))."""
 
 from typing import NamedTuple
 

@@ -1,6 +1,6 @@
 """Self-unloading crate: a pack on driven rollers, a door on a spring, the ground.
 
-The pack is a rigid box with six degrees of freedom, the door turns about its lower edge (theory.md, chapter 9). The
+The pack is a rigid box with six degrees of freedom, the door turns about its lower edge (theory, chapter 9). The
 hinge is the origin of the crate's frame: x outward along the tilted floor, y along the hinge, z away from the floor.
 The source is Pappalardo et al. 2023, sections 3.6, 3.7 and 6.2, which defines the spring; the sizes are chosen.
 """
@@ -102,7 +102,7 @@ def _bristle_rate(touches, i):
 
 @kernel
 def rate(p, t, x):
-    """Return the tangent: Newton and Euler for the pack, door equation, bristles (theory.md, eqs. (9.3) to (9.9))."""
+    """Return the tangent: Newton and Euler for the pack, door equation, bristles (theory, eqs. (9.3) to (9.9))."""
     f = frames(p, t, x)
     result = contacts(p, t, x)
     o, v = x.omega_body, x.velocity_world

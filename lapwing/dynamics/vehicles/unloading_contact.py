@@ -2,7 +2,7 @@
 
 The normal force is that of a spring and a damper that never pull; friction is the model of Canudas de Wit, Olsson,
 Astrom and Lischinsky (IEEE Trans. Autom. Control 40 (1995) 419), whose bristles carry a load at rest without creep
-(theory.md, eqs. (9.4) to (9.6)).
+(theory, eqs. (9.4) to (9.6)).
 """
 
 from typing import NamedTuple

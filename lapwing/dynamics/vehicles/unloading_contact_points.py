@@ -1,4 +1,4 @@
-"""Contacts of the pack and their velocities: rollers, edges, door, ground and walls (theory.md, section 9.3).
+"""Contacts of the pack and their velocities: rollers, edges, door, ground and walls (theory, section 9.3).
 
 `p` is a UnloadingParameters, `x` a UnloadingState.
 """
@@ -38,7 +38,7 @@ def roller_speed(p, t):
 
 @always_inline
 def frames(p, t, x):
-    """Return the frames of crate, door and pack at time t (theory.md, eqs. (9.1) and (9.2))."""
+    """Return the frames of crate, door and pack at time t (theory, eqs. (9.1) and (9.2))."""
     s, c = math.sincos(p.tilt)
     forward, upward = (c, 0.0, -s), (s, 0.0, c)
     opened, shut = math.sincos(x.door[0])

@@ -1,4 +1,4 @@
-"""Body of a vehicle as the rays of other vehicles' sensors meet it: an upright cylinder (theory.md, eq. (3.52))."""
+"""Body of a vehicle as the rays of other vehicles' sensors meet it: an upright cylinder (theory, eq. (3.52))."""
 
 from typing import TYPE_CHECKING, NamedTuple
 

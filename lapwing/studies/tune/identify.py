@@ -1,4 +1,4 @@
-"""Identification of the plant about hover from a flight: gains and lag (theory.md, section 4.8).
+"""Identification of the plant about hover from a flight: gains and lag (theory, section 4.8).
 
 The input is the controller's demand on the rotors, not the setpoint, so any controller and any excitation (chirp,
 steps, square wave) can be used. Both sides pass the same low-pass filter, which yields angular accelerations from

@@ -1,4 +1,4 @@
-"""State estimator: an error-state Kalman filter of pure functions (theory.md, section 3.3)."""
+"""State estimator: an error-state Kalman filter of pure functions (theory, section 3.3)."""
 
 from lapwing.services.autopilot.estimator.covariance_inflation import reset_imu_biases
 from lapwing.services.autopilot.estimator.filter_parameters import PRESETS, Estimator

@@ -1,4 +1,4 @@
-"""Covariance inflation after repeated rejections of a source (theory.md, section 3.4).
+"""Covariance inflation after repeated rejections of a source (theory, section 3.4).
 
 Readings that are rejected for a long time indicate a wrong estimate. Its covariance grows until they are accepted.
 """

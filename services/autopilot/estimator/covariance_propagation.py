@@ -1,4 +1,4 @@
-"""Propagation of the covariance over one interval (theory.md, eqs. (3.22), (3.23), (3.61) and (3.66))."""
+"""Propagation of the covariance over one interval (theory, eqs. (3.22), (3.23), (3.61) and (3.66))."""
 
 from typing import Any
 

@@ -1,4 +1,4 @@
-"""Rows and innovation variances of delayed measurements (theory.md, eqs. (3.30) and (3.35))."""
+"""Rows and innovation variances of delayed measurements (theory, eqs. (3.30) and (3.35))."""
 
 from typing import NamedTuple
 
@@ -20,7 +20,7 @@ class Noise(NamedTuple):
 
 @always_inline
 def delayed_position_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay: float) -> None:
-    """Fill the row of the position `delay` seconds ago, with the receiver's correlated error (theory.md, eq. (3.30)).
+    """Fill the row of the position `delay` seconds ago, with the receiver's correlated error (theory, eq. (3.30)).
 
     `force_world` is the specific force during the delay, weighted by its effect on the position.
     """
@@ -43,7 +43,7 @@ def delayed_velocity_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, delay
 def delayed_innovation_variances(
     m: Memory, axis: int, since: Noise, variance: float, force_world: Vec3
 ) -> tuple[float, float]:
-    """Return the innovation variances for gain and gate of a delayed row (theory.md, eqs. (3.35) and (3.36)).
+    """Return the innovation variances for gain and gate of a delayed row (theory, eqs. (3.35) and (3.36)).
 
     Writes the covariance of innovation and present error to `m.product`. The noise since the measurement, such as an
     impact, was not measured; the gate allows for its correction by other sources.

@@ -1,4 +1,4 @@
-"""Filter state, initialisation and output (theory.md, section 3.3).
+"""Filter state, initialisation and output (theory, section 3.3).
 
 The error state has 24 components. Its attitude part is a world rotation vector: R = exp(theta) R_estimated.
 """
@@ -16,7 +16,7 @@ from lapwing.services.common.ports import StateEstimate
 SIZE = 24
 THETA, VELOCITY, POSITION, GYRO, ACCELEROMETER, WANDER, IRON = 0, 3, 6, 9, 12, 15, 18
 HEADING, BAROMETER, SCALE = 21, 22, 23
-CONSIDERED = 24  # errors of instruments that are considered and not estimated (theory.md, eqs. (3.60) and (3.67))
+CONSIDERED = 24  # errors of instruments that are considered and not estimated (theory, eqs. (3.60) and (3.67))
 GYRO_SCALE, GYRO_ALIGNMENT, MAG_SCALE, MAG_ALIGNMENT, LIFT = 0, 3, 6, 9, 11  # LIFT: accelerometers, eq. (3.66)
 DRIFT = 14  # warm-up of the gyroscopes, eq. (3.69)
 WIND, WIND_SQUARES, GUST = 17, 19, 21  # static pressure error, eq. (3.67); columns 22 and 23 are empty
@@ -76,7 +76,7 @@ class Memory(NamedTuple):
     rejected: np.ndarray  # (WATCHED,) 1 if the last reading of a source was rejected
     repeats: np.ndarray  # (WATCHED,) number of consecutive equal readings
     last: np.ndarray  # (WATCHED, 6) last reading of each source
-    trend: np.ndarray  # (2, 2) of horizontal innovations of GPS position and velocity (theory.md, eq. (3.64))
+    trend: np.ndarray  # (2, 2) of horizontal innovations of GPS position and velocity (theory, eq. (3.64))
     nis: np.ndarray  # (WATCHED,) last normalised innovation squared of each source
     packed: np.ndarray  # (1, PACKED) upper triangle of the covariance and `nis`, as published
 
@@ -91,7 +91,7 @@ class State(NamedTuple):
 
 @always_inline
 def attitude_from_gravity(p: Estimator, specific_force_body: Vec3, field_body: Vec3) -> Quaternion:
-    """Return the attitude at rest from gravity and magnetic field (theory.md, eq. (3.20))."""
+    """Return the attitude at rest from gravity and magnetic field (theory, eq. (3.20))."""
     up = scale(1.0 / norm(specific_force_body), specific_force_body)
     across = subtract(field_body, scale(dot(field_body, up), up))
     forth = scale(1.0 / norm(across), across)
@@ -194,7 +194,7 @@ def three(array: np.ndarray, start: int) -> Vec3:
 
 @kernel
 def apply_correction(s: State) -> State:
-    """Return the state with the pending correction applied (theory.md, eq. (3.25))."""
+    """Return the state with the pending correction applied (theory, eq. (3.25))."""
     n, d = s.nominal, s.memory.correction
     nominal = Nominal(
         normalise(multiply(exp(three(d, THETA)), n.attitude)),

@@ -1,4 +1,4 @@
-"""Fusion of optical flow as a replacement of GPS velocity (theory.md, eq. (3.45))."""
+"""Fusion of optical flow as a replacement of GPS velocity (theory, eq. (3.45))."""
 
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import Mat3, Vec3, cross, dot

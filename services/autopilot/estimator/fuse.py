@@ -1,4 +1,4 @@
-"""Sequential Kalman update by scalar measurements (theory.md, eqs. (3.26) to (3.28) and (3.62)).
+"""Sequential Kalman update by scalar measurements (theory, eqs. (3.26) to (3.28) and (3.62)).
 
 The caller fills `memory.row` with a row of the measurement matrix. Corrections accumulate in `memory.correction`, so
 that all rows of a reading are linearised about the same estimate.
@@ -121,7 +121,7 @@ def apply_update(m: Memory, innovation: float, s: float) -> float:
 
 @kernel
 def acceleration_row(m: Memory, force_world: Vec3, r: Mat3, axis: int, k: float) -> None:
-    """Add k times the row of the acceleration's error: theta x f - R b - R e f_z (theory.md, eqs. (3.22), (3.66))."""
+    """Add k times the row of the acceleration's error: theta x f - R b - R e f_z (theory, eqs. (3.22), (3.66))."""
     x, y, z = force_world
     if axis == 0:
         theta: Vec3 = (0.0, z, -y)

@@ -1,4 +1,4 @@
-"""Fusion of delayed position and velocity of a satellite receiver (theory.md, eqs. (3.29) and (3.30))."""
+"""Fusion of delayed position and velocity of a satellite receiver (theory, eqs. (3.29) and (3.30))."""
 
 from lapwing.dynamics.geodesy import geodetic_to_enu
 from lapwing.dynamics.lie.quaternion import rotation_matrix

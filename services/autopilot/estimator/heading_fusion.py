@@ -1,4 +1,4 @@
-"""Fusion of the magnetometer's heading (theory.md, eqs. (3.33) and (3.63))."""
+"""Fusion of the magnetometer's heading (theory, eqs. (3.33) and (3.63))."""
 
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import ZERO, Vec3, apply, cross, subtract

@@ -1,4 +1,4 @@
-"""Fusion of sonar near the ground and barometer (theory.md, eqs. (3.31), (3.32), (3.39) and (3.67))."""
+"""Fusion of sonar near the ground and barometer (theory, eqs. (3.31), (3.32), (3.71) and (3.67))."""
 
 from lapwing.dynamics.atmosphere import pressure_altitude
 from lapwing.dynamics.lie.quaternion import rotation_matrix
@@ -96,7 +96,7 @@ def update_sonar(p: Estimator, s: State, distance: float, variance: float, valid
 def follow_ground(p: Estimator, s: State) -> None:
     """Add the ground's variation since the last echo to the covariance of the height above ground.
 
-    The barometer's bias gets the opposite change, so that its level is unaffected (theory.md, eq. (3.39)).
+    The barometer's bias gets the opposite change, so that its level is unaffected (theory, eq. (3.71)).
 
     Args:
         p: `Estimator`.

@@ -1,4 +1,4 @@
-"""Prediction by IMU readings (theory.md, eqs. (3.21) to (3.24))."""
+"""Prediction by IMU readings (theory, eqs. (3.21) to (3.24))."""
 
 from lapwing.dynamics.lie.quaternion import exp, multiply, normalise, rotation_matrix
 from lapwing.dynamics.vector import Vec3, add, apply, norm, scale, subtract

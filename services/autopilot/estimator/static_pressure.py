@@ -1,4 +1,4 @@
-"""Static pressure error of the barometer in wind of unknown direction (theory.md, eqs. (3.67) and (3.68))."""
+"""Static pressure error of the barometer in wind of unknown direction (theory, eqs. (3.67) and (3.68))."""
 
 from lapwing.dynamics.atmosphere import share_of_squares
 from lapwing.dynamics.effects._turbulence import HIGHEST, LOWEST, SLOWEST, intensity

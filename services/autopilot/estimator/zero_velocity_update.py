@@ -1,4 +1,4 @@
-"""Zero-velocity update on the ground with motors off (theory.md, eq. (3.34))."""
+"""Zero-velocity update on the ground with motors off (theory, eq. (3.34))."""
 
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.kernels import kernel, math

@@ -81,7 +81,7 @@ def pulls(p: LoadDrive, t: float, x: LoadMotion) -> Vec3:
 
 @always_inline
 def rate(p: LoadDrive, t: float, x: LoadMotion) -> LoadMotion:
-    """Return the tangent of the load (theory.md, eq. (1.23))."""
+    """Return the tangent of the load (theory, eq. (1.23))."""
     air = Air(p.carriers[0].air_density, p.carriers[0].wind_world)
     return LoadMotion(x.load_velocity, load_acceleration(p.load.slings[0], p.load.field, air, pulls(p, t, x), x))
 

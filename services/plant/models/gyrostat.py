@@ -23,7 +23,7 @@ Wxyz = tuple[float, float, float, float]
 
 
 class Gyrostat(SceneTable):
-    """The satellite, its rotors and its control (theory.md, eqs. (7.6) to (7.9))."""
+    """The satellite, its rotors and its control (theory, eqs. (7.6) to (7.9))."""
 
     TABLE: ClassVar[str] = "gyrostat"
     OPTIONAL: ClassVar[bool] = True

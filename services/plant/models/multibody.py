@@ -35,7 +35,7 @@ class Event(BaseModel):
 
 
 class Multibody(SceneTable):
-    """Formulation of the five bodies, their constraints, drives and failures (theory.md, chapter 8)."""
+    """Formulation of the five bodies, their constraints, drives and failures (theory, chapter 8)."""
 
     TABLE: ClassVar[str] = "multibody"
     OPTIONAL: ClassVar[bool] = True

@@ -28,7 +28,7 @@ class Motors(BaseModel):
 
 
 class Os4(SceneTable):
-    """The quadrotor (theory.md, eqs. (7.11) to (7.14))."""
+    """The quadrotor (theory, eqs. (7.11) to (7.14))."""
 
     TABLE: ClassVar[str] = "os4"
     OPTIONAL: ClassVar[bool] = True

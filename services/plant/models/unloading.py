@@ -23,7 +23,7 @@ Pair = tuple[float, float]  # static and dynamic friction
 
 
 class Unloading(SceneTable):
-    """The crate, its rollers, its door and the pack (theory.md, chapter 9)."""
+    """The crate, its rollers, its door and the pack (theory, chapter 9)."""
 
     TABLE: ClassVar[str] = "unloading"
     OPTIONAL: ClassVar[bool] = True

@@ -8,7 +8,7 @@ from lapwing.services.trajectory.segments.segment import Finite, Positive, Segme
 
 
 class Chirp(Segment):
-    """start + amplitude sin(phase) with a linear frequency sweep (theory.md, eq. (4.4))."""
+    """start + amplitude sin(phase) with a linear frequency sweep (theory, eq. (4.4))."""
 
     kind: Literal["chirp"] = "chirp"
     amplitude: Finite  # [u]

@@ -7,7 +7,7 @@ from lapwing.services.trajectory.segments.segment import Finite, Positive, Segme
 
 
 class MinimumJerk(Segment):
-    """10 s^3 - 15 s^4 + 6 s^5 to the value `to` over `duration`: continuous acceleration (theory.md, eq. (4.3))."""
+    """10 s^3 - 15 s^4 + 6 s^5 to the value `to` over `duration`: continuous acceleration (theory, eq. (4.3))."""
 
     kind: Literal["minimum_jerk"] = "minimum_jerk"
     to: Finite  # [u]

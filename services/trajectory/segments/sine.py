@@ -8,7 +8,7 @@ from lapwing.services.trajectory.segments.segment import Finite, Positive, Segme
 
 
 class Sine(Segment):
-    """start + amplitude sin(2 pi frequency t) for `duration` (theory.md, eq. (4.4) with f_0 = f_1)."""
+    """start + amplitude sin(2 pi frequency t) for `duration` (theory, eq. (4.4) with f_0 = f_1)."""
 
     kind: Literal["sine"] = "sine"
     amplitude: Finite  # [u]

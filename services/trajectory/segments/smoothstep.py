@@ -7,7 +7,7 @@ from lapwing.services.trajectory.segments.segment import Finite, Positive, Segme
 
 
 class Smoothstep(Segment):
-    """3 s^2 - 2 s^3 to the value `to` over `duration`: continuous velocity (theory.md, eq. (4.2))."""
+    """3 s^2 - 2 s^3 to the value `to` over `duration`: continuous velocity (theory, eq. (4.2))."""
 
     kind: Literal["smoothstep"] = "smoothstep"
     to: Finite  # [u]

@@ -145,7 +145,7 @@ def test_inductance_follows_second_order_step(drone, situation, inductance):
     assert np.abs(speeds - exact).max() < 1e-3 * 5.0 / K
     without = 5.0 / K * (1 - np.exp(-t / mechanical))
     missed = np.abs(without - exact).max() / (electrical / mechanical * 5.0 / K)
-    assert 0.55 < missed < 0.95  # theory.md
+    assert 0.55 < missed < 0.95  # theory, section 2.6
 
 
 def test_current_is_continuous_when_voltage_changes(drone, situation):

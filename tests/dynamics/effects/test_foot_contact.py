@@ -50,7 +50,7 @@ def smooth(e, memory, s):
 
 
 class Foot:
-    """One foot by eqs. (2.12) to (2.17) of theory.md."""
+    """One foot by eqs. (2.12) to (2.17) of the theory."""
 
     def __init__(self, e, s, body):
         m = s.motion

@@ -78,7 +78,7 @@ def test_single_rotor_over_table_follows_cheeseman_and_bennett(drone, situation)
 
 
 def test_disc_over_edge_gains_by_its_area(drone, situation):
-    """Eight points of equal area approximate a circle's segment; theory.md lists the largest difference."""
+    """Eight points of equal area approximate a circle's segment; the theory lists the largest difference."""
     largest = 0.0
     for inside in np.linspace(-1.2, 1.2, 49):  # radii from the edge to the axis, positive over the table
         s = situation(position=(0, 0, TOP + R), turn=(0, 0, math.pi / 4))

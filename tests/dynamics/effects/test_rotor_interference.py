@@ -53,7 +53,7 @@ def test_flow_far_downstream_is_doubled():
 def test_flow_behind_rotor_against_survey():
     """Heyson and Katzoff, NACA TR 1319, as read by Prouty for a stabiliser: 1.5, at a skew of 87.7 degrees."""
     computed = normal_flow(1.0 / 0.0405, 1.08, 0.0, -0.3)
-    assert computed == pytest.approx(1.5, rel=0.13)  # theory.md: 1.68; the survey's disc was not uniform
+    assert computed == pytest.approx(1.5, rel=0.13)  # theory, section 2.12: 1.68; the survey's disc was not uniform
 
 
 def test_flow_against_integral_along_wake():
@@ -72,7 +72,7 @@ def test_flow_against_integral_along_wake():
 
 
 def test_mean_over_disc_is_accurate():
-    """64 points are compared with 1536; theory.md lists the largest difference."""
+    """64 points are compared with 1536; the theory lists the largest difference."""
     rings, places = 16, 96
     worst = 0.0
     for skew in (0.5, 0.75, 1.0):

@@ -1,4 +1,4 @@
-"""The paper's method: its leading error is the curvature term of theory.md, eq. (6.12)."""
+"""The paper's method: its leading error is the curvature term of theory, eq. (6.12)."""
 
 from typing import NamedTuple
 

@@ -16,7 +16,7 @@ P, START = FreeBodyParameters(INERTIA), RigidBody(exp((0.3, -0.2, 0.9)), OMEGA)
 
 
 def closed_form(t):
-    """Return omega_body(t) by Jacobi's elliptic functions (theory.md, eqs. (7.2) to (7.5)), for 2 T B < L^2."""
+    """Return omega_body(t) by Jacobi's elliptic functions (theory, eqs. (7.2) to (7.5)), for 2 T B < L^2."""
     a, b, c = INERTIA
     o1, o2, o3 = OMEGA
     energy, square = a * o1**2 + b * o2**2 + c * o3**2, (a * o1) ** 2 + (b * o2) ** 2 + (c * o3) ** 2

@@ -28,7 +28,7 @@ class Reduced(NamedTuple):
 
 
 def accelerations(system, configuration, velocity, wrench=None, drive=None) -> Reduced:
-    """Return accelerations by coordinate partitioning of the index-1 equations (theory.md, eqs. (8.25)-(8.27)).
+    """Return accelerations by coordinate partitioning of the index-1 equations (theory, eqs. (8.25)-(8.27)).
 
     See `augmented.accelerations` for arguments and errors.
     """
@@ -53,7 +53,7 @@ def accelerations(system, configuration, velocity, wrench=None, drive=None) -> R
 
 
 def mass_matrix(system, placement) -> np.ndarray:
-    """Return the assembled mass matrix, shape (6 n, 6 n), block diagonal (theory.md, eq. (8.5))."""
+    """Return the assembled mass matrix, shape (6 n, 6 n), block diagonal (theory, eq. (8.5))."""
     root, rotational = mass_roots(system.arrays, placement)
     out = np.zeros((6 * len(root), 6 * len(root)))
     for b in range(len(root)):

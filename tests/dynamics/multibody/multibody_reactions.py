@@ -18,7 +18,7 @@ class Reaction(NamedTuple):
 
 
 def reactions(system, configuration, velocity, solution: Solution, drive=None) -> dict[str, Reaction]:
-    """Return the reaction of every joint by name (theory.md, eqs. (8.23), (8.24)).
+    """Return the reaction of every joint by name (theory, eqs. (8.23), (8.24)).
 
     Multipliers of redundant rows are only the shortest choice; their sum over a joint and its drive is unique.
     """

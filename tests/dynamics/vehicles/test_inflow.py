@@ -20,7 +20,7 @@ def test_glauert(climb, across, kappa):
 
 @pytest.mark.parametrize(("kappa", "to_ring", "to_windmill"), [(1.0, 0.0053, 0.026), (1.15, 0.036, 0.176)])
 def test_descent_is_near_published_fit(kappa, to_ring, to_windmill):
-    """The published coefficients are rounded; theory.md lists the largest differences."""
+    """The published coefficients are rounded; the theory lists the largest differences."""
     fit = np.polynomial.Polynomial((kappa, *PUBLISHED[1:]))
     climb = np.linspace(-2.0 + 1e-12, -1e-12, 401)
     differences = np.abs([axial(x, kappa) for x in climb] - fit(climb))

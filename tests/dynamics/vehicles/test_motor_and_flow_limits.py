@@ -92,7 +92,7 @@ class Lag:
 class Motors:
     """Direct-current motors: three gaps of each rotor, to the lowest current, to a limit, and between its two limits.
 
-    A winding with inductance has the current of theory.md, eq. (2.76).
+    A winding with inductance has the current of theory, eq. (2.76).
     """
 
     def __init__(self, p):

@@ -98,7 +98,7 @@ def test_free_fall_and_momentum_without_rotors():
 
 
 def steady_voltage(p, constant, resistance, speed):
-    """Return the voltage [V] that holds a rotor at a speed [rad/s] (theory.md, eq. (7.14) at rest)."""
+    """Return the voltage [V] that holds a rotor at a speed [rad/s] (theory, eq. (7.14) at rest)."""
     return resistance * p.drag_constant * speed * speed / constant + constant * speed
 
 

@@ -69,7 +69,7 @@ def skew(v):
 
 
 def test_covariance_propagation_against_dense_matrices():
-    """theory.md, eq. (3.22), written out as F P F^T."""
+    """theory, eq. (3.22), written out as F P F^T."""
     rng = np.random.default_rng(0)
     covariance, f, dt = random_covariance(rng), rng.normal(size=3), 0.01
     r = np.array(rotation_matrix(from_roll_pitch_yaw(0.3, -0.5, 2.0))).reshape(3, 3)
@@ -374,7 +374,7 @@ def test_filter_is_accurate_without_gps_velocity():
 
 @pytest.mark.parametrize(("signs", "inflates"), [((1, 1), True), ((1, -1), False)])
 def test_small_innovations_of_one_sign_inflate_covariance(signs, inflates):
-    """theory.md, eq. (3.64): a reading of 2.5 deviations is accepted, but ten such readings are a drift."""
+    """theory, eq. (3.64): a reading of 2.5 deviations is accepted, but ten such readings are a drift."""
     s, largest = at_rest(), 0.0
     for k in range(20):
         spread = math.sqrt(s.memory.covariance[filter_state.VELOCITY, filter_state.VELOCITY] + 0.05**2)

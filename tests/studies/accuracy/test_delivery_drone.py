@@ -38,7 +38,7 @@ def test_hinges_drift_without_stabilisation(results):
 
 
 def test_reduced_model_keeps_its_model_error(results):
-    """The error is about 0.6 %, the share of the blades, parallel to x at the start (theory.md, eq. (8.51))."""
+    """The error is about 0.6 %, the share of the blades, parallel to x at the start (theory, eq. (8.51))."""
     for name in ("reduced, frame only", "reduced, mean"):
         (coarse, _), (fine, _) = results[name]
         assert fine == pytest.approx(coarse, rel=1e-3)

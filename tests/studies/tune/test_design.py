@@ -27,7 +27,7 @@ def airframe():
 
 
 def test_linear_model_equals_closed_form(model, airframe):
-    """Reference: theory.md, eqs. (1.13) and (4.30): 4/m, 4 l/J, 4 b/J_z, the motors' lag, and g over the tilt."""
+    """Reference: theory, eqs. (1.13) and (4.30): 4/m, 4 l/J, 4 b/J_z, the motors' lag, and g over the tilt."""
     arm = sum(abs(x) for x in airframe.rotor_x)
     i_x, i_y, i_z = airframe.inertia_body
     assert model.altitude == pytest.approx(4.0 / airframe.mass, rel=1e-6)
@@ -43,7 +43,7 @@ def test_linear_model_equals_closed_form(model, airframe):
 
 @pytest.mark.long
 def test_spin_up_reaction_adds_zero_to_yaw():
-    """theory.md, after eq. (4.31): a steady speed has the same effect, its rate adds I_r / (b_T dF/dOmega)."""
+    """theory, after eq. (4.31): a steady speed has the same effect, its rate adds I_r / (b_T dF/dOmega)."""
     scene = load_scene(SCENE.path.parent / "delivery_mission.toml")
     with_inertia, without, airframe = hover(scene), hover(SCENE), known_airframe(scene)
     assert with_inertia.yaw == pytest.approx(without.yaw, rel=1e-6)

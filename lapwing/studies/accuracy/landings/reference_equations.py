@@ -2,7 +2,7 @@
 
 Independent of `lapwing.dynamics`: attitudes are matrices. The cases of a foot are those of touchdown and lift-off,
 full onset of the normal force, change of its sign, sticking and sliding, the slip at which the dynamic coefficient is
-reached (theory.md, section 2.8), and on ground with a step the nearest face: its top, its wall, the ground before it,
+reached (theory, section 2.8), and on ground with a step the nearest face: its top, its wall, the ground before it,
 or wall and ground at once in the inner corner (section 2.9).
 """
 

@@ -151,7 +151,7 @@ def reference(frame: Any) -> np.ndarray:
     """Return the final (position, R, velocity, omega), shape (18,).
 
     Without external torque the angular momentum keeps its world direction: R' = R hat(omega) with
-    J(angles) omega + h = R^T L (theory.md, eq. (8.50)).
+    J(angles) omega + h = R^T L (theory, eq. (8.50)).
     """
     spin = -np.array(frame.rotors.reaction_sign) * SPEED
     own = np.array([0.0, 0.0, frame.rotors.inertia * spin.sum()])

@@ -40,7 +40,7 @@ def momentum(t: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def closed_form(inertia: tuple[float, float, float], start: RigidBody, t: float) -> np.ndarray:
-    """Return the coordinates at time t (theory.md, eqs. (7.2) to (7.5) and (7.5a)).
+    """Return the coordinates at time t (theory, eqs. (7.2) to (7.5) and (7.5a)).
 
     It holds for rotation about the axis of the largest moment, with omega_1 and omega_3 positive at the start.
     """

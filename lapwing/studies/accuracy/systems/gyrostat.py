@@ -81,7 +81,7 @@ def energy(p: GyrostatParameters, t: np.ndarray, y: np.ndarray) -> np.ndarray:
 
 
 def total_momentum(p: GyrostatParameters, t: np.ndarray, y: np.ndarray) -> np.ndarray:
-    """Return the momentum of platform and rotors in the world, shape (k, 3) (theory.md, eq. (7.8))."""
+    """Return the momentum of platform and rotors in the world, shape (k, 3) (theory, eq. (7.8))."""
     h = np.tile(p.rotor_momentum, (len(t), 1)).astype(float)
     h[:, 2] *= 1.0 + p.forcing_amplitude * np.cos(p.forcing_frequency * t)
     return to_world(y[:, :9], y[:, 9:] * p.inertia + h)
