@@ -5,6 +5,7 @@ from collections.abc import Callable, Mapping
 from typing import NamedTuple
 
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 
 Values = Mapping[str, float]
 CELL_VOLTAGE = 3.7  # [V] nominal
@@ -170,7 +171,7 @@ def _thrust(v: Values) -> float:
 
 def _hover(v: Values) -> float:
     """Return the rotor speed [rad/s] in hover."""
-    return v["stand_speed"] * math.sqrt(v["mass"] * 9.80665 / v["rotors"] / v["stand_thrust"])
+    return v["stand_speed"] * math.sqrt(v["mass"] * STANDARD_GRAVITY / v["rotors"] / v["stand_thrust"])
 
 
 def _hover_power(v: Values) -> float:

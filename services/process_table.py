@@ -25,7 +25,6 @@ class ProcessEntry(NamedTuple):
     name: str
     lock_step: bool  # part of the lock step; required if the run configuration has it
     resolves: bool = False  # has a `resolve.py` although it is not part of the lock step
-    needs: tuple[str, ...] = ()  # fields of the process specification that it reads besides the run configuration
     optional: bool = False  # started only if its option is given; the run continues without it
     mode: str = "peer"  # mode of its Zenoh session
     foreign: bool = False  # flies a foreign firmware instead of the autopilot
@@ -102,11 +101,11 @@ PROCESSES = (
     ProcessEntry("trajectory", True),
     ProcessEntry("formation", True),
     ProcessEntry("fmu", True),
-    ProcessEntry("recorder", False, needs=("log",)),
-    ProcessEntry("router", False, needs=("open",), optional=True, mode="router"),
-    ProcessEntry("mavlink", False, resolves=True, needs=("mavlink",), optional=True),
-    ProcessEntry("foxglove", False, needs=("foxglove",), optional=True),
-    ProcessEntry("ros2", False, needs=("ros2",), optional=True),
+    ProcessEntry("recorder", False),
+    ProcessEntry("router", False, optional=True, mode="router"),
+    ProcessEntry("mavlink", False, resolves=True, optional=True),
+    ProcessEntry("foxglove", False, optional=True),
+    ProcessEntry("ros2", False, optional=True),
 )
 AUTOPILOT, FMU = "autopilot", "fmu"
 RECORDER, ROUTER, MAVLINK, FOXGLOVE, ROS2 = "recorder", "router", "mavlink", "foxglove", "ros2"

@@ -7,15 +7,15 @@ from typing import Annotated, NamedTuple
 
 from annotated_types import Ge, Le
 
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.kernels import always_inline, math
 
-GRAVITY = 9.80665  # [m/s^2] g_0
 EARTH_RADIUS = 6_356_766.0  # [m] converts geometric to geopotential altitude
 GAS_CONSTANT = 287.05287  # [J/(kg K)] of dry air
 SEA_LEVEL_TEMPERATURE = 288.15  # [K]
 LAPSE_RATE = 0.0065  # [K/m] up to the tropopause, none above it
 TROPOPAUSE = 11_000.0  # [m] geopotential
-EXPONENT = GRAVITY / (GAS_CONSTANT * LAPSE_RATE)  # 5.2559
+EXPONENT = STANDARD_GRAVITY / (GAS_CONSTANT * LAPSE_RATE)  # 5.2559
 FREEZING = 273.15  # [K] at 0 degC
 # ((1 - u)**EXPONENT - 1) / u for -0.1 <= u <= 0.32, from 4 km below the sea to the tropopause: minimax polynomial of
 # relative error 3e-16, faster than `pow` (recomputed in tests/dynamics/test_atmosphere.py)
@@ -62,7 +62,7 @@ def pressure(a, altitude):
     result = a.sea_level_pressure * _lapse_factor(LAPSE_RATE * min(height, TROPOPAUSE) / ground)
     if height > TROPOPAUSE:
         kelvin = ground - LAPSE_RATE * TROPOPAUSE
-        result = result * math.exp((TROPOPAUSE - height) * GRAVITY / (GAS_CONSTANT * kelvin))
+        result = result * math.exp((TROPOPAUSE - height) * STANDARD_GRAVITY / (GAS_CONSTANT * kelvin))
     return result
 
 
@@ -77,7 +77,7 @@ def density_slope(a, altitude):
     """Return the change of density with altitude [kg/m^4]."""
     lapse = LAPSE_RATE if _geopotential(altitude) < TROPOPAUSE else 0.0
     weaker = EARTH_RADIUS / (EARTH_RADIUS + altitude)
-    return density(a, altitude) * (lapse - GRAVITY / GAS_CONSTANT) * weaker * weaker / temperature(a, altitude)
+    return density(a, altitude) * (lapse - STANDARD_GRAVITY / GAS_CONSTANT) * weaker * weaker / temperature(a, altitude)
 
 
 @always_inline
@@ -88,7 +88,7 @@ def pressure_altitude(a, pressure_now):
     if height > TROPOPAUSE:
         kelvin = ground - LAPSE_RATE * TROPOPAUSE
         at_tropopause = a.sea_level_pressure * math.pow(kelvin / ground, EXPONENT)
-        height = TROPOPAUSE + math.log(at_tropopause / pressure_now) * GAS_CONSTANT * kelvin / GRAVITY
+        height = TROPOPAUSE + math.log(at_tropopause / pressure_now) * GAS_CONSTANT * kelvin / STANDARD_GRAVITY
     return EARTH_RADIUS * height / (EARTH_RADIUS - height)
 
 

@@ -4,11 +4,11 @@ import datetime
 from typing import Any, NamedTuple
 
 from lapwing.dynamics.atmosphere import Atmosphere
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.geodesy import Home
 from lapwing.dynamics.terrain import LEVEL
 from lapwing.dynamics.vector import Vec3
 
-STANDARD_GRAVITY = 9.80665  # [m/s^2] ISO 80000-3
 FIRST_YEAR, LAST_YEAR = 2010, 2029  # range of the available World Magnetic Models
 TESLA = 1e-9  # [T] 1 nT
 DIGITS = 10  # decimal places of a field in tesla: 0.1 nT, as in the model's tables

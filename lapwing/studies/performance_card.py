@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 from rich.console import Console
 from rich.table import Table
 
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.input_file import read_text
 from lapwing.dynamics.vehicles import hover_loads, performance
 from lapwing.dynamics.vehicles.airframe import Airframe, load_airframe
@@ -52,7 +53,7 @@ def thrust_over_weight_without_a_rotor(airframe: Airframe, rotor: performance.Ro
         raise ValueError(f"the {count} rotors cannot lose one")
     most = performance.maximum_thrust(airframe, rotor=rotor) / B[0].sum()  # [N] maximum thrust of a rotor
     lifts = (most / max(collective for collective, *_ in shares) for shares in loss_tables)
-    return float(virtual_control_effectiveness(B)[0] * min(lifts)) / (airframe.mass.total * performance.GRAVITY)
+    return float(virtual_control_effectiveness(B)[0] * min(lifts)) / (airframe.mass.total * STANDARD_GRAVITY)
 
 
 # figure, also the name of its published value: (function, display unit, display unit in SI units)

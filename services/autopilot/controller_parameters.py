@@ -5,6 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.effects._types import WakeSlopes
 from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import math, python_function
@@ -52,7 +53,7 @@ class Airframe(NamedTuple):
     motor: Motor
     voltage_max: float  # [V]
     resting_height: float  # [m] world z of the vehicle's origin at rest on the ground
-    gravity: float = 9.80665  # [m/s^2]
+    gravity: float = STANDARD_GRAVITY  # [m/s^2]
     spin_up_zero: float = 0.0  # [s] torque of rotor acceleration over the change of reaction torque
     rotor_z: PerRotor = ()  # [m] of tilted rotors
     rotor_axis: tuple[Vec3, ...] = ()  # unit vector of each rotor's thrust, body; (): body z

@@ -45,8 +45,9 @@ def airspeed_encoder(topic: Topic, frame: str, port: Port) -> TopicEncoder:
 
 def reading_encoder(frame: str, port: Port) -> TopicEncoder:
     """Return the encoder of a port without a message type of its own: all numbers of its value, in order."""
-    sample = Reading(header(0, frame), port.name, (0.0,) * row_width(port.like))
-    return TopicEncoder(topic.custom_sensor(port.name), port.name, port.period, _reading, lambda: sample)
+    name = port.name.replace(".", "_")
+    sample = Reading(header(0, frame), name, (0.0,) * row_width(port.like))
+    return TopicEncoder(topic.custom_sensor(name), port.name, port.period, _reading, lambda: sample)
 
 
 def _reading(value: Any, time_ns: np.ndarray) -> Fields:

@@ -4,10 +4,8 @@ import json
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from lapwing.cosim.config.provenance import ENDED, WAITED, attachments, failure, metadata
-from lapwing.cosim.diagram.topic_encoder import RecordBatch
+from lapwing.cosim.diagram.topic_encoder import RecordBatch, split_at
 from lapwing.cosim.executors.deadlines import Lateness, lateness, metadata_entries
 from lapwing.cosim.executors.log_backpressure import LogProgressPublisher
 from lapwing.cosim.executors.participant import Participant, Stopped
@@ -132,14 +130,7 @@ class Pending:
         if stop <= self.written:
             return []
         self.written = stop
-        complete, remaining = [], []
-        for page in self._pages:
-            k = int(np.searchsorted(page.ticks, stop))
-            if k > 0:
-                complete.append(RecordBatch(page.topic, page.ticks[:k], page.payloads[:k]))
-            if k < len(page.ticks):
-                remaining.append(RecordBatch(page.topic, page.ticks[k:], page.payloads[k:]))
-        self._pages = remaining
+        complete, self._pages = split_at(self._pages, stop)
         return complete
 
     def waits_for(self) -> str:

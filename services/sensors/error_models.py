@@ -9,8 +9,6 @@ import numpy as np
 from lapwing.dynamics.vector import Mat3, Vec3, add, scale
 from lapwing.kernels import always_inline, math
 
-STANDARD_GRAVITY = 9.80665  # [m/s^2], the unit g of data sheets
-
 ALLAN_PEAK = 0.6173643  # largest Allan deviation of a first-order process of unit deviation
 ALLAN_PEAK_TIME = 1.8926178  # correlation times at which it is reached
 

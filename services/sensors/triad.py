@@ -5,6 +5,7 @@ from typing import Annotated, Any, NamedTuple
 import numpy as np
 from annotated_types import Ge, Gt, Le, Lt
 
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.noise import TURN_ON, Key, normal3
 from lapwing.dynamics.vector import ZERO, Mat3, Vec3, add, apply, dot, matmul, scale
 from lapwing.kernels import always_inline, kernel, math
@@ -13,7 +14,7 @@ from lapwing.services.sensors.delay_line import BLANK, Line, apply_delay_and_fau
 from lapwing.services.sensors.low_pass import REST, LowPass, LowPassState, state_at_rest, update
 
 _DPS = math.radians(1.0)  # [rad/s] in one degree per second
-MG = 1e-3 * error_models.STANDARD_GRAVITY  # [m/s^2] in one mg
+MG = 1e-3 * STANDARD_GRAVITY  # [m/s^2] in one mg
 
 
 class Gyro(NamedTuple):
@@ -139,7 +140,7 @@ def gyro_coupling_bias(c: CrossCoupling | None, key: Key, force: Vec3, square: V
     """Return the bias of the gyroscopes [rad/s] by specific force [m/s^2] and by vibration, its mean square [g^2]."""
     if c is None:
         return ZERO
-    k = c.g_sensitivity_dps_per_g * _DPS / error_models.STANDARD_GRAVITY
+    k = c.g_sensitivity_dps_per_g * _DPS / STANDARD_GRAVITY
     x, y = normal3(key, TURN_ON, _SKEWED + 1), normal3(key, TURN_ON, _SKEWED + 2)
     z = normal3(key, TURN_ON, _SKEWED + 3)
     by_force = (k * dot(x, force), k * dot(y, force), k * dot(z, force))

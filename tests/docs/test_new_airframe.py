@@ -8,6 +8,7 @@ import jsonschema
 import numpy as np
 import pytest
 
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.vehicles import performance
 from lapwing.dynamics.vehicles.airframe import Airframe
 from lapwing.dynamics.vehicles.airframe_tables import Propeller
@@ -41,7 +42,7 @@ def test_thrust_stand_data_reproduce_example_propeller():
 
 def test_example_can_hover_and_fly():
     vehicle = Airframe.model_validate(EXAMPLE)
-    assert 1.8 < performance.maximum_thrust(vehicle) / (vehicle.mass.total * performance.GRAVITY) < 2.5
+    assert 1.8 < performance.maximum_thrust(vehicle) / (vehicle.mass.total * STANDARD_GRAVITY) < 2.5
     assert performance.trim(vehicle).thrust == pytest.approx(2.0 * 9.80665 / 4.0)
     assert 10.0 < performance.hover_time(vehicle) / 60.0 < 30.0
     assert performance.maximum_speed(vehicle) > 8.0

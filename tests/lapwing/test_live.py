@@ -147,7 +147,7 @@ def test_browser_follows_running_flight(tmp_path):
         for _ in range(3):
             run.step()
             follow.observe(run)
-        with chromium.Browser(page.address, tmp_path / "profile") as browser:
+        with chromium.Browser(page.address) as browser:
             height = browser.run(
                 """
                 const until = async (holds) => {

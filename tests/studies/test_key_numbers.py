@@ -112,7 +112,7 @@ def test_percent_has_no_exponent(share, text):
 @pytest.mark.skipif(headless.PROGRAM is None, reason="needs Chromium")
 def test_click_on_event_moves_plots(tmp_path):
     page = write(flight(), tmp_path / "a.html")
-    with headless.Browser(page, tmp_path / "profile") as browser:
+    with headless.Browser(page) as browser:
         ranges = browser.run(
             """
             const until = async (holds) => {

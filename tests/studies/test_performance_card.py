@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 from scipy.optimize import linprog
 
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.vehicles import performance
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.services.autopilot.controller_parameters import rotor_effectiveness
@@ -110,7 +111,7 @@ def test_card_and_autopilot_use_active_rotor_model(tmp_path, tables):
     assert nominal.torque_per_thrust == pytest.approx(2.0e-5 / 4.0e-4)
     assert resolve(load(scene)).vehicle == "drone1"
     rows = {row.name: row for row in card(scene)}
-    weight = load_airframe(VEHICLE).mass.total * performance.GRAVITY
+    weight = load_airframe(VEHICLE).mass.total * STANDARD_GRAVITY
     speed = math.sqrt(0.25 * weight / 4.0e-4)
     motor = load_airframe(VEHICLE).motor
     current = 2.0e-5 * speed**2 / motor.rotor_constant + motor.no_load_current

@@ -86,7 +86,7 @@ def fly(user, changed):
 
 def test_user_selects_changes_runs_views_and_compares(start, tmp_path):
     studio = start(tmp_path)
-    with chromium.Browser(studio.address, tmp_path / "profile", (1280, 900)) as browser:
+    with chromium.Browser(studio.address, (1280, 900)) as browser:
         user = User(browser)
         assert fly(user, {}) == "lapwing run hover --speed max"
         user.do("await until(() => one('.outcome'));")
@@ -134,7 +134,7 @@ def test_user_watches_flight_live_and_stops(start, tmp_path):
     long = {"speed": "1", "view": "yes", "run.duration": "3000", "trajectory.phase.1.duration": "2500"}
     status, _, headers = studio.request("scenes/hover/run", long)
     assert status == 303
-    with chromium.Browser(f"{studio.origin}{headers['Location']}", tmp_path / "profile", (900, 700)) as browser:
+    with chromium.Browser(f"{studio.origin}{headers['Location']}", (900, 700)) as browser:
         user = User(browser)
         user.do("await until(() => one('#time').textContent.includes('simulated'));")
         live = user.do("return (await until(() => one('iframe.live').src));")
@@ -148,7 +148,7 @@ def test_user_watches_flight_live_and_stops(start, tmp_path):
 
 def test_page_fits_phone(start, tmp_path):
     studio = start(tmp_path)
-    with chromium.Browser(f"{studio.address}scenes/delivery_mission", tmp_path / "profile", (390, 800)) as browser:
+    with chromium.Browser(f"{studio.address}scenes/delivery_mission", (390, 800)) as browser:
         width = User(browser).do(
             """
             await until(() => document.readyState === "complete" && one("#scene").dataset.previewed);

@@ -49,6 +49,18 @@ class RecordBatch(NamedTuple):
     payloads: np.ndarray  # (n,) records of the message
 
 
+def split_at(batches: Iterable[RecordBatch], stop: int) -> tuple[list[RecordBatch], list[RecordBatch]]:
+    """Return (messages before tick `stop`, messages from it on), without empty batches."""
+    before, after = [], []
+    for batch in batches:
+        k = int(np.searchsorted(batch.ticks, stop))
+        if k > 0:
+            before.append(RecordBatch(batch.topic, batch.ticks[:k], batch.payloads[:k]))
+        if k < len(batch.ticks):
+            after.append(RecordBatch(batch.topic, batch.ticks[k:], batch.payloads[k:]))
+    return before, after
+
+
 def encode(
     encoder: TopicEncoder, port: Port, setup: RunConfig, ticks: np.ndarray, rows: np.ndarray
 ) -> Iterator[RecordBatch]:

@@ -3,10 +3,8 @@
 import time
 from collections.abc import Iterable
 
-import numpy as np
-
 from lapwing.cosim.config.run_config import RunConfig
-from lapwing.cosim.diagram.topic_encoder import RecordBatch
+from lapwing.cosim.diagram.topic_encoder import RecordBatch, split_at
 from lapwing.cosim.log import LogWriter
 from lapwing.messages import WallTime, header
 from lapwing.messages.topics import TOPICS, WALL_TIME, Topic, topic_rank
@@ -58,18 +56,11 @@ class Recording:
 
     def _write_chunk(self) -> None:
         """Write the messages of the ticks before the cut, and the wall time."""
-        complete, remaining = [], []
-        for page in self._waiting:
-            k = int(np.searchsorted(page.ticks, self._cut))
-            if k > 0:
-                complete.append(RecordBatch(page.topic, page.ticks[:k], page.payloads[:k]))
-            if k < len(page.ticks):
-                remaining.append(RecordBatch(page.topic, page.ticks[k:], page.payloads[k:]))
+        complete, self._waiting = split_at(self._waiting, self._cut)
         if complete:
             self._writer.write_page(self._parts(complete))
             self._flushed = time.monotonic()
         self._write_wall_time(min(self.time_ns, (self._cut - 1) * self._setup.interval_ns))
-        self._waiting = remaining
         self._cut += self._chunk
 
     def _parts(self, pages: list[RecordBatch]) -> list[tuple]:

@@ -2,9 +2,10 @@
 
 from typing import NamedTuple
 
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.effects._hooks import field, wrench
-from lapwing.dynamics.environment import STANDARD_GRAVITY, Environment
+from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.vector import NOTHING
 
 KIND = "gravity"

@@ -11,10 +11,6 @@ CUBIC = tuple((-1) ** k / math.factorial(2 * k + 3) for k in range(9))
 # |B_2k| / (2k)!, k = 1 ... 10, with the Bernoulli numbers B_2k
 _BERNOULLI = (1 / 6, 1 / 30, 1 / 42, 1 / 30, 5 / 66, 691 / 2730, 7 / 6, 3617 / 510, 43867 / 798, 174611 / 330)
 COTANGENT = tuple(b / math.factorial(2 * k + 2) for k, b in enumerate(_BERNOULLI))
-# derivatives with respect to a^2, which SE(3) needs
-COSINE_SLOPE = tuple(k * c for k, c in enumerate(COSINE))[1:]
-CUBIC_SLOPE = tuple(k * c for k, c in enumerate(CUBIC))[1:]
-COTANGENT_SLOPE = tuple(k * c for k, c in enumerate(COTANGENT))[1:]
 
 
 @always_inline
@@ -100,30 +96,3 @@ def cotangent_ratio(v):
         return polynomial(COTANGENT, square)
     half, sine, cosine = half_angle(v)
     return (1.0 - half * cosine / sine) / square
-
-
-@always_inline
-def cosine_slope(square):
-    """Return d/d(a^2) of (1 - cos(a)) / a^2 (theory, eq. (5.18))."""
-    if square < 1.0:
-        return polynomial(COSINE_SLOPE, square)
-    return (0.5 * sine_ratio(square) - cosine_ratio(square)) / square
-
-
-@always_inline
-def cubic_slope(square):
-    """Return d/d(a^2) of (a - sin(a)) / a^3 (theory, eq. (5.18))."""
-    if square < 1.0:
-        return polynomial(CUBIC_SLOPE, square)
-    return 0.5 * (cosine_ratio(square) - 3.0 * cubic_ratio(square)) / square
-
-
-@always_inline
-def cotangent_slope(v):
-    """Return d/d(a^2) of (1 - (a/2) cot(a/2)) / a^2 at a = |v|, with its double pole at 2 pi (eq. (5.18))."""
-    square = v[0] * v[0] + v[1] * v[1] + v[2] * v[2]
-    if square < 1.0:
-        return polynomial(COTANGENT_SLOPE, square)
-    half, sine, cosine = half_angle(v)
-    turned = half * cosine / sine
-    return (0.125 / (sine * sine) - (1.0 - 0.5 * turned) / square) / square

@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 from lapwing.dynamics.lie.so3 import turn
 from lapwing.dynamics.vector import cross, dot, norm, scale
-from lapwing.kernels import always_inline, math
+from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import MANIFOLDS, Manifold
 
 
@@ -26,15 +26,6 @@ def retract(q, v):
     r = turn(v, q)
     # first-order normalisation, otherwise the rounding errors of many equal steps accumulate in the length
     return Direction(*scale(1.5 - 0.5 * dot(r, r), r))
-
-
-@always_inline
-def log(q, r):
-    """Return the rotation vector orthogonal to q and r that takes q to r; zero for r = -q, without a unique axis."""
-    axis = cross(q, r)
-    sine = norm(axis)
-    k = 1.0 if sine < 1e-150 else math.atan2(sine, dot(q, r)) / sine
-    return scale(k, axis)
 
 
 @always_inline

@@ -7,15 +7,7 @@ from typing import NamedTuple
 
 from lapwing.dynamics.lie import quaternion, so3
 from lapwing.dynamics.lie.quaternion import Quaternion, rotate
-from lapwing.dynamics.lie.ratios import (
-    cosine_ratio,
-    cosine_slope,
-    cotangent_ratio,
-    cotangent_slope,
-    cubic_ratio,
-    cubic_slope,
-)
-from lapwing.dynamics.vector import Vec3, add, cross, dot, scale
+from lapwing.dynamics.vector import Vec3, add, cross, scale
 from lapwing.kernels import always_inline
 from lapwing.kernels.state_tree import MANIFOLDS, Manifold
 
@@ -34,13 +26,6 @@ def exp(u):
 
 
 @always_inline
-def log(g):
-    """Return (translation, rotation) of a rigid motion, inverse of `exp` for rotations below pi."""
-    rotation = quaternion.log(g[1])
-    return so3.dexpinv(rotation, g[0]), rotation
-
-
-@always_inline
 def adjoint(g, u):
     """Return Ad_g u, with g exp(u) = exp(Ad_g u) g (theory, eq. (5.17))."""
     rotation = rotate(g[1], u[1])
@@ -51,33 +36,6 @@ def adjoint(g, u):
 def commutator(u, v):
     """Return [u, v] in se(3): ad_u v."""
     return add(cross(u[1], v[0]), cross(u[0], v[1])), cross(u[1], v[1])
-
-
-@always_inline
-def _along(linear, quadratic, quadratic_slope, linear_slope, u, v):
-    """Return the derivative along u[0] of linear w x v + quadratic w x (w x v) at w = u[1] (theory, eq. (5.19))."""
-    b, w = u[0], u[1]
-    doubled = 2.0 * dot(b, w)
-    wv, bv = cross(w, v), cross(b, v)
-    first = add(scale(linear, bv), scale(doubled * linear_slope, wv))
-    second = add(scale(quadratic, add(cross(b, wv), cross(w, bv))), scale(doubled * quadratic_slope, cross(w, wv)))
-    return add(first, second)
-
-
-@always_inline
-def dexp(u, v):
-    """Return dexp(u, v) on se(3), with exp(u)' = (dexp(u, u'))^ exp(u) (theory, eq. (5.19))."""
-    square = dot(u[1], u[1])
-    c, d = cosine_ratio(square), cubic_ratio(square)
-    coupling = _along(c, d, cubic_slope(square), cosine_slope(square), u, v[1])
-    return add(so3.dexp(u[1], v[0]), coupling), so3.dexp(u[1], v[1])
-
-
-@always_inline
-def dexpinv(u, v):
-    """Return the inverse of `dexp(u, .)`; singular at a rotation of 2 pi (theory, eq. (5.19))."""
-    coupling = _along(-0.5, cotangent_ratio(u[1]), cotangent_slope(u[1]), 0.0, u, v[1])
-    return add(so3.dexpinv(u[1], v[0]), coupling), so3.dexpinv(u[1], v[1])
 
 
 @always_inline

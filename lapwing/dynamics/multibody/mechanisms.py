@@ -1,6 +1,6 @@
-"""Mechanisms built for the general engine: three of the IFToMM benchmark library, and the delivery drone.
+"""Mechanisms built for the general engine: two of the IFToMM benchmark library, and the delivery drone.
 
-Benchmarks A01, A02, A04: M. Gonzalez, D. Dopico, U. Lugris, J. Cuadrado, A benchmarking system for MBS simulation
+Benchmarks A02, A04: M. Gonzalez, D. Dopico, U. Lugris, J. Cuadrado, A benchmarking system for MBS simulation
 software, Multibody System Dynamics 16 (2006) 179; https://www.iftomm-multibody.org/benchmark.
 Gravity is -y there, 9.81 m/s^2.
 Each function returns (system, configuration (n, 7), velocity (n, 6)), consistent.
@@ -23,13 +23,6 @@ def _at(positions):
     configuration[:, :3] = positions
     configuration[:, 3] = 1.0
     return configuration
-
-
-def pendulum(inertia: float = 1e-9) -> tuple[System, np.ndarray, np.ndarray]:
-    """Return A01: 1 kg at 1 m from a hinge, released at rest from the horizontal, with a small inertia [kg m^2]."""
-    hinge = Revolute("hinge", GROUND, 0, (0.0, 0.0, 0.0), (-1.0, 0.0, 0.0), Z, Z)
-    system = assemble([Body("mass", 1.0, (inertia,) * 3)], [hinge], gravity=GRAVITY)
-    return system, _at([(1.0, 0.0, 0.0)]), np.zeros((1, 6))
 
 
 def four_bars(n: int = 2, speed: float = 1.0) -> tuple[System, np.ndarray, np.ndarray]:

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 
 from lapwing.dynamics.multibody.augmented import ANY, RANK_TOLERANCE, as_float_arrays, raise_if_singular, solve
-from lapwing.dynamics.multibody.body_kinematics import add_increment, configuration_rate, place
+from lapwing.dynamics.multibody.body_kinematics import add_increment, configuration_rate
 from lapwing.dynamics.multibody.constraints import velocity_defect
 from lapwing.dynamics.multibody.stabilisation import (
     BAUMGARTE,
@@ -140,24 +140,6 @@ def simulate(
         )
         raise_if_singular(system, singular, f" at t = {i * step:.6g} s")
     return out
-
-
-@kernel
-def _energy(a, q, v):
-    p = place(q, v)
-    kinetic, potential = 0.0, 0.0
-    for b in range(len(a.mass)):
-        kinetic += 0.5 * a.mass[b] * np.sum(p.velocity[b] ** 2)
-        for i in range(3):
-            for j in range(3):
-                kinetic += 0.5 * p.omega[b, i] * a.inertia[b, i, j] * p.omega[b, j]
-        potential -= a.mass[b] * np.sum(a.gravity * p.position[b])
-    return kinetic, potential
-
-
-def energy(system, configuration, velocity) -> tuple[float, float]:
-    """Return (kinetic, potential) energy [J]; the potential is zero with all centres of mass at the origin."""
-    return _energy(system.arrays, np.asarray(configuration, float), np.asarray(velocity, float))
 
 
 def check(system, configuration, velocity, drive=None, tolerance=CONSISTENT) -> None:

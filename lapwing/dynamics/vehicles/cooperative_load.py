@@ -166,14 +166,3 @@ def quad_position(p, x, i):
 def quad_velocity(p, x, i):
     """Return the velocity [m/s] of quadrotor i."""
     return subtract(x.load_velocity, scale(p.link_length[i], cross(x.link[i].omega, x.link[i].direction)))
-
-
-@kernel
-def energy(p, x):
-    """Return kinetic and potential energy [J] (theory, eq. (7.17))."""
-    total = 0.5 * p.load_mass * dot(x.load_velocity, x.load_velocity) + p.load_mass * p.gravity * x.load_position[2]
-    for i in range(len(x.link)):
-        v, o = quad_velocity(p, x, i), x.omega_body[i]
-        total += 0.5 * (p.quad_mass[i] * dot(v, v) + dot(o, multiply(p.quad_inertia[i], o)))
-        total += p.quad_mass[i] * p.gravity * quad_position(p, x, i)[2]
-    return total

@@ -13,6 +13,7 @@ from scipy.optimize import brentq, minimize_scalar
 
 from lapwing.dynamics import atmosphere
 from lapwing.dynamics.atmosphere import Atmosphere
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.effects.coaxial_interference import CoaxialInterference, has_rotor_in_wake
 from lapwing.dynamics.environment import STANDARD
 from lapwing.dynamics.vehicles.airframe import Airframe
@@ -24,7 +25,6 @@ from lapwing.dynamics.vehicles.propeller import (
     torque_coefficient,
 )
 
-GRAVITY = 9.80665  # [m/s^2]
 DENSITY = 1.225  # [kg/m^3]
 CELL_VOLTAGE = 3.7  # [V] nominal
 ITERATIONS = 100  # iterations of the rotor speed; each reduces the error by at least 10 %
@@ -110,7 +110,7 @@ def trim(
     rotor, count = rotor or rotor_of(airframe), len(airframe.rotors.position)
     if speed > 0.0 and airframe.drag is None:
         raise ValueError("the vehicle has no [drag]")
-    weight = (airframe.mass.total if mass is None else mass) * GRAVITY
+    weight = (airframe.mass.total if mass is None else mass) * STANDARD_GRAVITY
     ahead, _, below = airframe.drag.area if airframe.drag else (0.0, 0.0, 0.0)
     pressure = 0.5 * density * speed * speed
 
@@ -182,7 +182,7 @@ def maximum_thrust(airframe: Airframe, density: float = DENSITY, rotor: Rotor | 
 
 def thrust_over_weight(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
     """Return the maximum thrust over the weight of the loaded vehicle in still air, including resistive losses."""
-    return maximum_thrust(airframe, density, rotor) / (airframe.mass.total * GRAVITY)
+    return maximum_thrust(airframe, density, rotor) / (airframe.mass.total * STANDARD_GRAVITY)
 
 
 def battery_energy(airframe: Airframe) -> float:
@@ -199,12 +199,12 @@ def hover_time(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None
 
 def maximum_payload(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
     """Return the mass [kg] that the maximum thrust lifts beyond the empty vehicle, without control margin."""
-    return maximum_thrust(airframe, density, rotor) / GRAVITY - (airframe.mass.total - airframe.mass.payload)
+    return maximum_thrust(airframe, density, rotor) / STANDARD_GRAVITY - (airframe.mass.total - airframe.mass.payload)
 
 
 def maximum_tilt(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
     """Return the tilt [rad] at which the maximum thrust still balances the weight."""
-    return math.acos(min(airframe.mass.total * GRAVITY / maximum_thrust(airframe, density, rotor), 1.0))
+    return math.acos(min(airframe.mass.total * STANDARD_GRAVITY / maximum_thrust(airframe, density, rotor), 1.0))
 
 
 def ceiling(airframe: Airframe, air: Atmosphere = STANDARD.atmosphere, rotor: Rotor | None = None) -> float:
@@ -215,7 +215,7 @@ def ceiling(airframe: Airframe, air: Atmosphere = STANDARD.atmosphere, rotor: Ro
     """
     if rotor is not None and not rotor.with_density:
         raise ValueError("[effects.rotor_quadratic] has no air density")
-    weight = airframe.mass.total * GRAVITY
+    weight = airframe.mass.total * STANDARD_GRAVITY
 
     def excess(altitude: float) -> float:
         return maximum_thrust(airframe, atmosphere.density(air, altitude), rotor) - weight

@@ -4,7 +4,6 @@ Lagrange-d'Alembert gives theory, eqs. (7.11) to (7.14), with the gyroscopic ter
 keep their speed, or follow their motors' voltages if there are motors.
 """
 
-import math
 from typing import NamedTuple
 
 from lapwing.dynamics.integrators import RATES
@@ -45,11 +44,6 @@ class Os4State(NamedTuple):
     velocity_world: Vec3  # [m/s]
     omega_body: Vec3  # [rad/s]
     rotor_speed: Four  # [rad/s], all positive
-
-
-def hover_speed(p: Os4Parameters) -> float:
-    """Return the rotor speed [rad/s] at which four thrusts balance the weight (theory, eq. (7.15))."""
-    return math.sqrt(p.mass * p.gravity / (4.0 * p.lift_constant))
 
 
 @always_inline

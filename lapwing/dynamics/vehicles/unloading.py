@@ -172,20 +172,3 @@ def forces_on_pack(p, t, x):
     result = contacts(p, t, x)
     rollers = map_index(_force, x.on_rollers, result.rollers)
     return rollers, _wrench(result.door, x)[0], _wrench(result.ground, x)[0], _wrench(result.walls, x)[0]
-
-
-@kernel
-def energy(p, t, x):
-    """Return kinetic and potential energy [J] of pack, door, its spring and the springs of ground and rollers.
-
-    Bristles, the door's stop and its edge on the ground are excluded: the sum is the energy while the door touches
-    neither.
-    """
-    f = frames(p, t, x)
-    o, v = x.omega_body, x.velocity_world
-    inertia = p.door_mass * p.door_length * p.door_length / 3.0
-    kinetic = 0.5 * (p.pack_mass * dot(v, v) + dot(o, multiply(p.pack_inertia, o)) + inertia * x.door[1] * x.door[1])
-    height = f.hinge[2] + 0.5 * p.door_length * f.along_door[2]
-    weight = p.gravity * (p.pack_mass * x.position_world[2] + p.door_mass * height)
-    wound = x.door[0] + p.door_preload
-    return kinetic + weight + 0.5 * p.door_spring * wound * wound

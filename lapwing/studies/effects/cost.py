@@ -14,6 +14,7 @@ import numpy as np
 from numba import types
 
 from lapwing.cosim.scene import Scene
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.effects._vehicle_interaction import NeighbourState, all_interactions, interacts, presence
 from lapwing.dynamics.effects.shared_slung_load import SharedSlungLoad
 from lapwing.dynamics.noise import Key, stream_key
@@ -35,7 +36,6 @@ STEPS = 2000  # steps in one timed call
 ROUNDS = 60  # calls of each variant, interleaved so that disturbances affect all variants
 HEIGHT = 10.0  # [m]
 SPACING = 5.0  # [m] between the vehicles of a fleet, which do not touch or enter another one's wake
-STANDARD_GRAVITY = 9.81  # [m/s^2]
 
 
 class Cost(NamedTuple):

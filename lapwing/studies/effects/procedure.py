@@ -10,7 +10,7 @@ from lapwing.cosim.scene import Scene
 from lapwing.dynamics import effects
 from lapwing.dynamics.effects._vehicle_interaction import INTERACTION
 from lapwing.services.autopilot.schema import Autopilot
-from lapwing.services.common.firmware.schema import OWN, firmware_of, flown_by_firmware
+from lapwing.services.common.firmware.schema import require_own_autopilot
 from lapwing.services.common.vehicle_schema import Vehicle
 from lapwing.studies.effects.cost import costs
 from lapwing.studies.effects.variants import (
@@ -123,9 +123,7 @@ def study(
     for vehicle in vehicles:
         if not vehicle.has(Autopilot):
             raise ValueError(f"{scene.path}: the model {vehicle[Vehicle].model} has no effects; expected a multirotor")
-        if flown_by_firmware(vehicle):
-            fault = f"flights of {firmware_of(vehicle)} are not repeatable"
-            raise ValueError(f'{scene.path}: {fault}; expected autopilot.firmware = "{OWN}"')
+        require_own_autopilot(vehicle, "flights of {firmware} are not repeatable")
     tables = tables_of(scene)
     present = names_of(tables)
     names = sorted({*effects.names(), *present} if only is None else set(only))

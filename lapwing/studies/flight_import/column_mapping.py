@@ -9,17 +9,17 @@ from typing import Any, Literal
 import numpy as np
 from pydantic import BaseModel, ConfigDict, ValidationError
 
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.input_file import read_text, unreadable
 from lapwing.dynamics.validation import fault
 
-GRAVITY = 9.80665  # [m/s^2]
 SCALES = {
     "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9,
     "m": 1.0, "cm": 1e-2, "mm": 1e-3,
     "m/s": 1.0, "cm/s": 1e-2, "mm/s": 1e-3,
     "rad": 1.0, "deg": np.pi / 180.0,
     "rad/s": 1.0, "deg/s": np.pi / 180.0, "mrad/s": 1e-3,
-    "m/s^2": 1.0, "g": GRAVITY, "mg": 1e-3 * GRAVITY,
+    "m/s^2": 1.0, "g": STANDARD_GRAVITY, "mg": 1e-3 * STANDARD_GRAVITY,
     "V": 1.0, "mV": 1e-3, "cV": 1e-2,
 }  # fmt: skip
 

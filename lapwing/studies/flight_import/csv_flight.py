@@ -5,6 +5,7 @@ from pathlib import Path
 import numpy as np
 from scipy.ndimage import median_filter
 
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.studies.flight_import.channels import check_density, check_rate_unit
 from lapwing.studies.flight_import.column_mapping import SCALES, Mapping, Motors, Scalar, Vector
 from lapwing.studies.flight_import.csv_table import read_columns
@@ -14,7 +15,7 @@ from lapwing.studies.rotation_arrays import body_rate, continuous, from_euler, f
 
 FASTEST_TURN = 40.0  # [rad/s] mean rate between two measured attitudes above which tracking is lost
 FASTEST = 20.0  # [m/s] mean speed between two measured positions above which tracking is lost
-ACCELEROMETER_LIMIT = 16.0 * 9.80665  # [m/s^2] range of common accelerometers
+ACCELEROMETER_LIMIT = 16.0 * STANDARD_GRAVITY  # [m/s^2] range of common accelerometers
 SPIKE = 8.0  # [rad/s] difference of a gyroscope from its running median above which it is a fault
 FEWEST = 50  # minimum number of samples of a recording
 NEIGHBOURS = 2  # samples on either side of a fault that interpolation may have changed

@@ -9,6 +9,7 @@ from typing import TextIO, cast
 
 import numpy as np
 
+from lapwing.dynamics.input_file import unreadable
 from lapwing.studies.flight_import.message_columns import NumberRows
 
 RATIO, SMALLEST = 100, 16_000_000  # largest size of unpacked text: relative to the file, [bytes] for small files
@@ -37,7 +38,7 @@ def read_columns(path: Path, selected: Collection[str]) -> dict[str, np.ndarray]
         if table is None:  # empty fields need the slower, tolerant parser
             table = _read_tolerant(path, indices)
     except OSError as error:
-        raise ValueError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise unreadable(path, error, "a table (.csv, .csv.gz)") from None
     except (UnicodeDecodeError, EOFError, zlib.error):
         raise ValueError(f"{path}: is not a text file of columns; expected CSV, or CSV compressed with gzip") from None
     if not len(table):

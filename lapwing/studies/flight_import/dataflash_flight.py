@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from lapwing.dynamics.input_file import unreadable
 from lapwing.studies.flight_import.channels import FLU, Channels, to_recording
 from lapwing.studies.flight_import.message_columns import Columns, MessageColumns
 from lapwing.studies.flight_import.recording import Recording, Series, convert, session_notes
@@ -120,7 +121,7 @@ def _messages(path: Path) -> tuple[dict[str, Columns], dict[str, float], set[str
     messages = MessageColumns({name: ("TimeUS", *fields) for name, fields in USED.items()})
     primary: dict[str, int] = {}
     cores, parameters, unknown = set(), {}, set()
-    unreadable = f"{path}: is not a readable dataflash log; expected a .bin or .log file of ArduPilot"
+    damaged = f"{path}: is not a readable dataflash log; expected a .bin or .log file of ArduPilot"
     try:
         kind = DFReader_binary if path.suffix.lower() == ".bin" else DFReader_text
         with _silent(), _open_reader(kind, path) as reader:
@@ -139,11 +140,11 @@ def _messages(path: Path) -> tuple[dict[str, Columns], dict[str, float], set[str
                 else:
                     unknown.add(name)
     except OSError as error:
-        raise ValueError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise unreadable(path, error, "a .bin or .log file of ArduPilot") from None
     except Exception:  # pymavlink raises exceptions of many types
-        raise ValueError(unreadable) from None
+        raise ValueError(damaged) from None
     if not len(messages):
-        raise ValueError(unreadable)
+        raise ValueError(damaged)
     columns, sessions = messages.longest_session()
     notes = [f"EKF core {', '.join(map(str, sorted(cores)))} was primary"] if cores - {0} else []
     return columns, parameters, unknown - {"FMT", "FMTU", "UNIT", "MULT"}, [*notes, *session_notes(sessions)]

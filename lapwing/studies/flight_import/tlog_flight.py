@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from lapwing.dynamics.constants import STANDARD_GRAVITY
+from lapwing.dynamics.input_file import unreadable
 from lapwing.studies.flight_import.channels import FLU, Channels, to_recording
 from lapwing.studies.flight_import.dataflash_flight import motor_outputs, pulse_range
 from lapwing.studies.flight_import.message_columns import Columns, MessageColumns
@@ -15,7 +17,6 @@ from lapwing.studies.flight_import.recording import Recording, Series, convert, 
 from lapwing.studies.rotation_arrays import from_euler, from_ned_frd, ned_to_enu
 
 HIGHEST_SHARE = 2.0  # values of ACTUATOR_OUTPUT_STATUS above are pulses [us]
-STANDARD_GRAVITY = 9.80665
 NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID
 WRAP = 2**32  # [us] period of the time stamp of SERVO_OUTPUT_RAW
 UNKNOWN_VOLTAGE = 65535  # SYS_STATUS.voltage_battery
@@ -120,7 +121,7 @@ def _messages(path: Path) -> tuple[dict[str, Columns], float, dict[str, float], 
                 clock = getattr(message, "time_boot_ms", np.nan) * 1e-3
                 systems.setdefault(sender, MessageColumns(fields)).add(message, clock)
     except OSError as error:
-        raise ValueError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise unreadable(path, error, "a telemetry log (.tlog)") from None
     if system is None:
         system = next(iter(systems), None)
     messages = None if system is None else systems.get(system)

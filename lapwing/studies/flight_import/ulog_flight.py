@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from lapwing.dynamics.input_file import unreadable
 from lapwing.studies.flight_import.channels import FLU, Channels, to_recording
 from lapwing.studies.flight_import.recording import Recording, Series, convert
 from lapwing.studies.rotation_arrays import from_euler, from_ned_frd, ned_to_enu, to_euler, unit
@@ -43,7 +44,7 @@ def read_ulog_flight(path: Path) -> Recording:
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):  # pyulog prints messages on damaged data
             log = ULog(str(path))
     except OSError as error:
-        raise ValueError(f"{path}: cannot be read: {(error.strerror or str(error)).lower()}") from None
+        raise unreadable(path, error, "a .ulg file of PX4") from None
     except Exception:  # pyulog raises exceptions of many types
         raise ValueError(f"{path}: is not a readable ULog file; expected a .ulg file of PX4") from None
     topics: dict[str, dict[str, Any]] = {}

@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.geodesy import Home, geodetic_to_enu
 from lapwing.services.sensors.delay_line import DEPTH
-from lapwing.services.sensors.error_models import STANDARD_GRAVITY
 from lapwing.studies.flight_import.recording import Recording, Series
 from lapwing.studies.flight_import.time_alignment import time_offset
 from lapwing.studies.rotation_arrays import body_rate

@@ -13,7 +13,7 @@ from lapwing.services.autopilot.margins import Margins, margins, open_loops
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.autopilot.schema import Autopilot
 from lapwing.services.common.communication_schema import Communication
-from lapwing.services.common.firmware.schema import OWN, firmware_of, flown_by_firmware
+from lapwing.services.common.firmware.schema import require_own_autopilot
 from lapwing.services.common.run_schema import follows_trajectory
 from lapwing.services.common.vehicle_schema import Vehicle
 from lapwing.studies.campaign.campaign_config import campaign_setup
@@ -84,9 +84,7 @@ def tune(
     """
     if not scene.has(Autopilot):
         raise ValueError(f"{scene.path}: has no [autopilot] to tune; use a scene with an autopilot")
-    if flown_by_firmware(scene):
-        fault = f"{firmware_of(scene)} has its own gains"
-        raise ValueError(f'{scene.path}: {fault}; expected autopilot.firmware = "{OWN}"')
+    require_own_autopilot(scene, "{firmware} has its own gains")
     for name, value in initial._asdict().items():
         if not 0.0 < value < float("inf"):
             raise ValueError(f"--{name} {value:g}: expected a bandwidth above 0 rad/s")

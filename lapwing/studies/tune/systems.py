@@ -21,7 +21,6 @@ class StepResponse(NamedTuple):
     value: np.ndarray
     rise: float  # [s] from 10 to 90 %
     overshoot: float  # relative
-    settling: float  # [s] until the response stays within 2 %
 
 
 def systems(p: Parameters, airframe: Airframe, tick: float, delay: int) -> dict[str, Any]:
@@ -43,4 +42,4 @@ def step(loop: Any, seconds: float = 5.0) -> StepResponse:
     """Return the step response of a closed loop from its open loop, over a time [s]."""
     time, value = control.step_response(close_loop(loop), np.linspace(0.0, seconds, 1001))
     result = control.step_info(value, time, yfinal=1.0)
-    return StepResponse(time, value, result["RiseTime"], result["Overshoot"] / 100.0, result["SettlingTime"])
+    return StepResponse(time, value, result["RiseTime"], result["Overshoot"] / 100.0)

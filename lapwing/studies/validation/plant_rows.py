@@ -40,20 +40,13 @@ class PlantRows:
         inertia: inertia for each parameter set [kg m^2], shape (sets, 3, 3).
     """
 
-    def __init__(
-        self,
-        scene: Scene | str | Path,
-        interval: float,
-        overrides: Overrides = (),
-        sets: Sequence[Mapping[str, Any]] = ({},),
-    ):
-        """Resolve the scene once for each parameter set.
+    def __init__(self, scene: Scene | str | Path, interval: float, overrides: Overrides = ()):
+        """Resolve the scene, with one parameter set without values.
 
         Args:
             scene: path or name of a scene, or a loaded scene, whose model is a single rigid body.
             interval: time between two samples, the plant's tick [s].
             overrides: overrides of the scene, for all parameter sets.
-            sets: values by dotted key, for each parameter set.
 
         Raises:
             SceneError: the scene is invalid or of another model.
@@ -76,10 +69,10 @@ class PlantRows:
         perturbed = [self._row({FORCE: [1.0, 0.0, 0.0]}), self._row({TORQUE: [1.0, 0.0, 0.0]})]
         columns = [int(np.flatnonzero(row != base)[0]) for row in perturbed]
         self._force, self._torque = (slice(c, c + 3) for c in columns)
-        self.set_parameters(sets)
+        self.set_parameters([{}])
 
     def set_parameters(self, sets: Sequence[Mapping[str, Any]]) -> None:
-        """Resolve the scene for other parameter sets."""
+        """Resolve the scene once for each parameter set: values by dotted key."""
         plants = [self._build(values) for values in sets]
         self.rows = np.array([row for row, _, _ in plants])
         self.mass = np.array([mass for _, mass, _ in plants])

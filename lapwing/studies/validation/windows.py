@@ -29,10 +29,10 @@ class Errors(NamedTuple):
     power: np.ndarray  # [W] electrical power of the motors, shape (n, h, 1); NaN where not measured
 
 
-def window_starts(flight: Recording, longest: int, stride: int, lowest: float = LOWEST) -> np.ndarray:
+def window_starts(flight: Recording, longest: int, stride: int) -> np.ndarray:
     """Return the possible first samples of windows: valid and airborne from `PAST` samples before to the end."""
     height = flight.position[:, 2]
-    usable = flight.valid & (height > lowest) & (flight.motor_voltage.max(axis=1) > 0.0)
+    usable = flight.valid & (height > LOWEST) & (flight.motor_voltage.max(axis=1) > 0.0)
     count = np.concatenate([[0], np.cumsum(~usable)])
     starts = np.arange(PAST, len(flight) - longest, stride)
     return starts[count[starts + longest + 1] == count[starts - PAST]]

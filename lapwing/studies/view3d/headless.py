@@ -30,22 +30,18 @@ class Browser:
         errors: exceptions and error lines of the page's console.
     """
 
-    def __init__(
-        self, page: Path | str, profile: Path | None = None, size: tuple[int, int] | None = None, flags: str = ""
-    ):
+    def __init__(self, page: Path | str, size: tuple[int, int] | None = None, flags: str = ""):
         """Create a browser.
 
         Args:
             page: path or address of the page.
-            profile: folder of the browser's profile; None: a temporary one.
             size: width and height of the window [pixel]; None: the default.
             flags: further options of the browser.
         """
         self.errors: list[str] = []
         self._page, self._size, self._flags = page, size, flags
         self._number, self._rest = 0, b""
-        self._temporary = tempfile.TemporaryDirectory(ignore_cleanup_errors=True) if profile is None else None
-        self._profile = Path(self._temporary.name) if self._temporary else profile
+        self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
 
     def __enter__(self) -> Self:
         if PROGRAM is None:
@@ -57,7 +53,7 @@ class Browser:
             "-c",
             START.format(flags=self._flags, reading=reading, writing=writing),
             PROGRAM,
-            str(self._profile),
+            self._profile.name,
         ]
         self._process = subprocess.Popen(command, pass_fds=(reading, writing), stderr=subprocess.DEVNULL)
         os.close(reading)
@@ -79,8 +75,7 @@ class Browser:
         self._process.wait()
         os.close(self._to)
         os.close(self._from)
-        if self._temporary:
-            self._temporary.cleanup()
+        self._profile.cleanup()
 
     def run(self, body: str) -> Any:
         """Run the body of an asynchronous function in the page; return its value. Raise BrowserError if it fails."""

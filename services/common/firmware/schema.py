@@ -54,3 +54,10 @@ def firmware_of(scene: Scene) -> str:
 def flown_by_firmware(scene: Scene) -> bool:
     """Return True if a foreign firmware flies the vehicle."""
     return firmware_of(scene) in FIRMWARES
+
+
+def require_own_autopilot(scene: Scene, fault: str) -> None:
+    """Raise ValueError if a foreign firmware flies the vehicle; `fault` says why not, with {firmware} for its name."""
+    if flown_by_firmware(scene):
+        fault = fault.format(firmware=firmware_of(scene))
+        raise ValueError(f'{scene.path}: {fault}; expected autopilot.firmware = "{OWN}"')

@@ -3,13 +3,14 @@
 import math
 from typing import Any
 
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.messages.topics import TRUTH
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.mavlink.frames import saturate, swap_world
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
-MILLI_G = 9.80665e-3  # [m/s^2]
+MILLI_G = 1e-3 * STANDARD_GRAVITY  # [m/s^2]
 
 
 @stream("HIL_STATE_QUATERNION", 15.0)

@@ -4,6 +4,7 @@ import math
 from collections.abc import Sequence
 from typing import Any
 
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.messages import GPSStatus, NavSatStatus
 from lapwing.messages.topics import BARO, GPS, GPS_DETAILS, GPS_VELOCITY, IMU, MAG
 from lapwing.services.common.failure_types import FIX_SATELLITES
@@ -14,7 +15,7 @@ from lapwing.services.mavlink.px4_facts import SATELLITES
 from lapwing.services.mavlink.telemetry.message_stream import stream
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
-GAUSS, HECTOPASCAL, MILLI_G = 1e-4, 100.0, 9.80665e-3
+GAUSS, HECTOPASCAL, MILLI_G = 1e-4, 100.0, 1e-3 * STANDARD_GRAVITY
 FIX_TYPES = {  # by the status of the receiver
     NavSatStatus.STATUS_FIX: mavlink.GPS_FIX_TYPE_3D_FIX,
     NavSatStatus.STATUS_SBAS_FIX: mavlink.GPS_FIX_TYPE_DGPS,

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from multibody_energy import energy
 from test_five_bodies import scene
 
 from lapwing.dynamics.integrators import get
@@ -18,7 +19,6 @@ from lapwing.dynamics.multibody.five_body_stabilisation import (
     project,
 )
 from lapwing.dynamics.multibody.mechanisms import drone_system
-from lapwing.dynamics.multibody.simulation import energy
 from lapwing.dynamics.multibody.stabilisation import project as general_project
 
 METHOD = get("rk4_renormalised").Method()

@@ -4,6 +4,7 @@ propellers, locked, free and torn-off propellers, a redundant loop."""
 import numpy as np
 import pytest
 from multibody_angles import euler_from_quaternion
+from multibody_energy import energy
 from test_augmented import PAPER
 from test_delivery_drone import momentum, without_propeller
 
@@ -22,7 +23,7 @@ from lapwing.dynamics.multibody.five_body_stabilisation import (
     constraint_violation,
 )
 from lapwing.dynamics.multibody.mechanisms import bricard, drone_system
-from lapwing.dynamics.multibody.simulation import energy, simulate
+from lapwing.dynamics.multibody.simulation import simulate
 
 GRAVITY, NOWHERE = (0.0, 0.0, -9.81), (0.0, 0.0, 0.0)
 ZERO4 = (0.0,) * 4

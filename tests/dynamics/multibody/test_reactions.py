@@ -5,10 +5,11 @@ import pytest
 from multibody_angles import euler_from_quaternion
 from multibody_reactions import reactions
 from test_augmented import state
+from test_mechanisms import pendulum
 
 from lapwing.dynamics.multibody.augmented import accelerations
 from lapwing.dynamics.multibody.body_kinematics import place
-from lapwing.dynamics.multibody.mechanisms import drone_system, pendulum
+from lapwing.dynamics.multibody.mechanisms import drone_system
 
 G = 9.81
 

@@ -7,19 +7,31 @@ from scipy.integrate import solve_ivp
 from lapwing.dynamics.integrators import get, rate, simulate
 from lapwing.dynamics.lie.quaternion import exp, rotation_matrix
 from lapwing.dynamics.lie.ts2 import Swing, normalise
+from lapwing.dynamics.vector import dot, multiply
 from lapwing.dynamics.vehicles.cooperative_load import (
     CooperativeLoadParameters,
     CooperativeLoadState,
     LiftCommand,
-    energy,
     quad_position,
     quad_velocity,
 )
+from lapwing.kernels import kernel
 from lapwing.kernels.state_tree import embed, unflatten
 
 ZERO = (0.0, 0.0, 0.0)
 INERTIA = (0.0820, 0.0845, 0.1377)
 G = 9.81
+
+
+@kernel
+def energy(p, x):
+    """Return kinetic and potential energy [J] (theory, eq. (7.17))."""
+    total = 0.5 * p.load_mass * dot(x.load_velocity, x.load_velocity) + p.load_mass * p.gravity * x.load_position[2]
+    for i in range(len(x.link)):
+        v, o = quad_velocity(p, x, i), x.omega_body[i]
+        total += 0.5 * (p.quad_mass[i] * dot(v, v) + dot(o, multiply(p.quad_inertia[i], o)))
+        total += p.quad_mass[i] * p.gravity * quad_position(p, x, i)[2]
+    return total
 
 
 def swinging(n, seed=0):

@@ -7,7 +7,7 @@ import pytest
 
 from lapwing.dynamics.integrators import get, rate, simulate
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, exp, to_roll_pitch_yaw
-from lapwing.dynamics.vehicles.quadrotor_os4 import Os4Motors, Os4Parameters, Os4State, hover_speed, net_force
+from lapwing.dynamics.vehicles.quadrotor_os4 import Os4Motors, Os4Parameters, Os4State, net_force
 from lapwing.kernels.state_tree import unflatten
 
 ZERO = (0.0, 0.0, 0.0)
@@ -22,10 +22,6 @@ def start(*rpm):
 def fly(rpm, p=OS4, method="lie_euler"):
     _, states = simulate(get(method), p, start(*rpm), 1e-3, 3000, every=3000)
     return unflatten(start(*rpm), tuple(map(float, states[-1])))
-
-
-def test_hover_speed_equals_published_value():
-    assert round(hover_speed(OS4) / RPM) == 2155
 
 
 def test_experiment_1_hovers():

@@ -3,6 +3,7 @@
 import pytest
 
 from lapwing.cosim.scene import SceneError
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.vehicles import performance
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.services.common.run_schema import SHIPPED
@@ -30,7 +31,7 @@ def test_vehicle_that_cannot_hover(overrides, message):
 
 def test_hover_limit_equals_performance_card():
     """A weight just below the maximum thrust is accepted, one just above it is rejected."""
-    heaviest = performance.maximum_thrust(DRONE, 1.225) / performance.GRAVITY
+    heaviest = performance.maximum_thrust(DRONE, 1.225) / STANDARD_GRAVITY
     scene = {**ELECTRIC, "environment.home.height": 0.0}
     load("hover", {**scene, "vehicle.mass": 0.999 * heaviest})
     with pytest.raises(SceneError, match="hovering needs"):

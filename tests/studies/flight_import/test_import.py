@@ -75,7 +75,7 @@ def broken(path, text):
     [
         ("flight.ulg", b"no log", "is not a readable ULog file"),
         ("flight.csv", b"a,b\n1,2\n", "none of the mapped columns"),
-        ("flight.csv.gz", b"no gzip", "cannot be read"),
+        ("flight.csv.gz", b"no gzip", "cannot be read: not a gzipped file (b'no'); expected a table (.csv, .csv.gz)"),
         ("flight.csv.gz", gzip.compress(bytes(17_000_000)), "unpacks to over 16 MB"),
         ("flight.txt", b"1 2 3", "unknown format"),
         ("flight.mcap", b"\x89MCAP0\r\n", "is not a readable rosbag2"),

@@ -44,7 +44,6 @@ def test_step_of_first_order_loop_is_closed_form():
     assert np.allclose(result.value, 1.0 - np.exp(-w * result.time), atol=1e-6)
     assert result.rise == pytest.approx(math.log(9.0) / w, rel=0.02)
     assert result.overshoot == pytest.approx(0.0, abs=1e-4)
-    assert result.settling == pytest.approx(math.log(50.0) / w, rel=0.02)
 
 
 def test_steps_settle_at_setpoint(airframe):

@@ -57,7 +57,7 @@ def test_report_without_viser_names_extra(tmp_path, monkeypatch):
 def test_browser_follows_vehicle_and_seeks(tmp_path, page):
     path = tmp_path / "view.html"
     path.write_text(embedded(page), encoding="utf-8")
-    with chromium.Browser(path, tmp_path / "profile") as browser:
+    with chromium.Browser(path) as browser:
         shown, seen, onboard, place = browser.run(
             READY
             + """
@@ -83,7 +83,7 @@ def test_browser_follows_vehicle_and_seeks(tmp_path, page):
 @pytest.mark.long
 @pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
 def test_browser_links_view_to_plots(tmp_path, page):
-    with chromium.Browser(page, tmp_path / "profile") as browser:
+    with chromium.Browser(page) as browser:
         played, sought, cursor = browser.run(
             """
             const until = async (holds) => {
@@ -119,7 +119,7 @@ def test_browser_links_view_to_plots(tmp_path, page):
 @pytest.mark.long
 @pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
 def test_view_opens_at_event_that_was_chosen_before(tmp_path, page):
-    with chromium.Browser(page, tmp_path / "profile") as browser:
+    with chromium.Browser(page) as browser:
         time = browser.run(
             """
             const until = async (holds) => {
@@ -146,7 +146,7 @@ def test_view_opens_at_event_that_was_chosen_before(tmp_path, page):
 def test_bar_follows_player_less_often_than_trail_and_body(tmp_path, page):
     path = tmp_path / "view.html"
     path.write_text(embedded(page), encoding="utf-8")
-    with chromium.Browser(path, tmp_path / "profile") as browser:
+    with chromium.Browser(path) as browser:
         bars, seconds, apart = browser.run(
             READY
             + """
@@ -186,7 +186,7 @@ def test_fleet_is_drawn_in_few_calls_and_only_on_change(tmp_path):
     first.fleet = {one.vehicle: one.truth for one in (first, *first.others)}
     path = tmp_path / "view.html"
     path.write_text(view_page([first], [first.vehicle]), encoding="utf-8")
-    with chromium.Browser(path, tmp_path / "profile", size=(960, 540)) as browser:
+    with chromium.Browser(path, size=(960, 540)) as browser:
         calls, trail, names, frames, seconds, after = browser.run(
             READY
             + """

@@ -106,7 +106,7 @@ def test_browser_shows_points_and_hides_their_layer(log, tmp_path):
     pytest.importorskip("viser", reason="needs viser (pip install lapwing[view3d])")
     flight, path = FlightData.read(log, only=SHOWN), tmp_path / "view.html"
     path.write_text(page([flight], ["drone1"]), encoding="utf-8")
-    with chromium.Browser(path, tmp_path / "profile", size=(640, 360)) as browser:
+    with chromium.Browser(path, size=(640, 360)) as browser:
         counts, shown, rows = browser.run(
             READY
             + """

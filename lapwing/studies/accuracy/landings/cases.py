@@ -11,6 +11,7 @@ import numpy as np
 
 import lapwing.scenes
 from lapwing.dynamics import effects, integrators
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.effects._contact_parameters import GroundContact
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.lie.quaternion import Quaternion, exp, multiply
@@ -34,7 +35,6 @@ from lapwing.studies.accuracy.solver_selection import IMPACT_SHARE
 AIRFRAME = Path(lapwing.scenes.__file__).parent / "vehicles/delivery_drone.toml"
 DURATION, INTERVAL = 0.6, 0.004  # [s] of a flight, and between the compared times
 ACCURACIES = tuple(10.0**-k for k in range(3, 10))
-GRAVITY = 9.80665
 CLEARANCE = 2e-3  # [m] initial height of the lowest point above the ground
 WAVE = 2.0 * math.pi / 0.7  # [1/m] of bumps
 MAX_STEPS = 64  # in an interval
@@ -201,7 +201,8 @@ def exact(case: Landing, tolerance: float = 3e-15) -> tuple[np.ndarray, int]:
     body = LandingBody(
         p.body.mass, np.array(p.body.inertia), np.array(e.feet),
         np.column_stack([layout.x_body, layout.y_body, layout.z_body]), np.array(layout.reaction_sign),
-        rotor.thrust_constant * STANDARD_DENSITY, rotor.torque_constant * STANDARD_DENSITY, layout.lag_rate, GRAVITY,
+        rotor.thrust_constant * STANDARD_DENSITY, rotor.torque_constant * STANDARD_DENSITY, layout.lag_rate,
+        STANDARD_GRAVITY,
     )  # fmt: skip
     ground = LandingGround(
         case.slope, case.bump, WAVE, e.stiffness, e.damping, 1.0 / e.inverse_width, e.static, e.dynamic,

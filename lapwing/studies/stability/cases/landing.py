@@ -8,6 +8,7 @@ import numpy as np
 
 import lapwing.scenes
 from lapwing.dynamics import effects, integrators
+from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.lie.quaternion import exp
 from lapwing.dynamics.terrain import relief
@@ -20,7 +21,7 @@ HARD = "touchdown at 0.3 to 5 m/s on 1e6 N/m per foot at any phase of a step; re
 DRONE = load_airframe(Path(lapwing.scenes.__file__).parent / "vehicles/delivery_drone.toml")
 METHOD = integrators.get("rk4_renormalised").Method()
 MOTORS_OFF = (0.0,) * 4  # [V]
-G, HEIGHT, STEP = 9.80665, 0.35, 1e-3
+G, HEIGHT, STEP = STANDARD_GRAVITY, 0.35, 1e-3
 SPEEDS = (0.3, 1.0, 3.0, 5.0)  # [m/s]
 PHASES = np.arange(8) / 8  # phase of a step at the contact
 EVERY_SECOND_PHASE = PHASES[::2]

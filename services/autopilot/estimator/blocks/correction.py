@@ -12,8 +12,6 @@ from lapwing.services.autopilot.estimator import Estimator, State
 from lapwing.services.autopilot.estimator.blocks.navigation_state import NavigationState
 from lapwing.services.common.ports import BarometerReading, DistanceReading, MagnetometerReading, OpticalFlowReading
 
-Reading = BarometerReading | DistanceReading | MagnetometerReading | OpticalFlowReading
-
 
 class Correction(NamedTuple):
     """Parameters of the block."""
