@@ -299,7 +299,6 @@ def test_campaign_checks_values_before_slow_imports(option, value, message):
         ("run hover --log .", "--log .: is a folder; expected the path of an output file"),
         ("effects hover --only ,", "--only ',': expected names of effects, separated by commas"),
         ("campaign hover --sweep binary.csv", "binary.csv: cannot be read: not a UTF-8 text file; expected a table"),
-        ("campaign hover --runs 1 --out flight.csv", "flight.csv: is a file; expected a new folder, or the folder of"),
         ("export-library hover --out flight.csv", "flight.csv: is a file; expected the path of an output folder"),
     ],
 )
