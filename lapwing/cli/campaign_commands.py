@@ -162,7 +162,7 @@ def _distributions(vary: list[str]) -> "dict[str, Distribution]":
     for text in vary:
         key, separator, distribution = (part.strip() for part in text.partition("="))
         if not separator or not key:
-            raise ValueError(f"--vary {text}: expected KEY=DISTRIBUTION")
+            raise ValueError(f"--vary {text}: expected KEY=DISTRIBUTION, for example vehicle.mass=normal(10.4,0.2)")
         if key in result:
             raise ValueError(f"--vary {text}: {key} already has a distribution; use one for each key")
         try:

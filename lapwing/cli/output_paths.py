@@ -46,6 +46,8 @@ def check_not_dash(path: Path | None) -> None:
 def create_folder(path: Path, parents: bool = False) -> None:
     """Create a folder unless it exists, and claim it (see `claim_folder`)."""
     check_not_dash(path)
+    if path.exists() and not path.is_dir():
+        raise ValueError(f"{path}: is a file; expected the path of an output folder")
     with write_errors(path):
         path.mkdir(parents=parents, exist_ok=True)
     claim_folder(path)

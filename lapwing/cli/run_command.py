@@ -130,6 +130,8 @@ def _spec(options: RunOptions, scene: "Scene") -> "ProcessSpec":
     if table is not None:
         check_complete(table, [*required_processes(setup, external_services(table)), MONITOR])
     log = options.log or reserve_log(scene.name)
+    if not log.name:
+        raise ValueError(f"--log {log}: is a folder; expected the path of an output file")
     report = options.report or log.with_suffix(".html")
     check_distinct({"SCENE": options.scene, "--log": log, "--json": options.json, "--report": report})
     if table is None:

@@ -92,6 +92,8 @@ def effects(
         raise ValueError(f"--tolerance {tolerance:g}: expected a distance above 0 m")
     screen = console()
     names = None if only is None else [name.strip() for name in only.split(",")]
+    if names is not None and not all(names):
+        raise ValueError(f"--only {only!r}: expected names of effects, separated by commas")
 
     def find() -> Study:
         with StudyProgress(screen, "flights") as progress:

@@ -12,7 +12,10 @@ def check_regular(path: Path) -> None:
 
 def unreadable(subject: str | Path, error: OSError | UnicodeDecodeError, expected: str) -> ValueError:
     """Return the error of an input file that cannot be read: its name or option, the reason, and the expected kind."""
-    reason = (getattr(error, "strerror", None) or str(error)).lower()
+    if isinstance(error, UnicodeDecodeError):
+        reason = "not a UTF-8 text file"
+    else:
+        reason = (error.strerror or str(error)).lower()
     return ValueError(f"{subject}: cannot be read: {reason}; expected {expected}")
 
 

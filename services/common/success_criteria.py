@@ -53,7 +53,7 @@ class Success(SceneTable):
         """Raise ConfigError if an expression uses an unknown metric."""
         for i, text in enumerate(self.require):
             for name in sorted(_expression(text).names - set(metrics)):
-                raise ConfigError.unknown(f"success.require.{i}", "figure", name, metrics)
+                raise ConfigError.unknown(f"success.require.{i}", "metric", name, metrics)
 
     def unmet(self, figures: Mapping[str, Any]) -> list[str]:
         """Return the expressions that do not hold for these metrics."""

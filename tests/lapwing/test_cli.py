@@ -39,7 +39,7 @@ BAD = {
     "preset": ([DELIVERY, "--set", "sensors.imu.preset=x"], "unknown preset 'x'; expected one of"),
     "no number": ([HOVER, "--run", "abc"], "--run abc: expected a valid integer (see lapwing run --help)"),
     "list": ([HOVER, "--set", 'success.require="time"'], "override success.require: expected a list, got 'time'"),
-    "success": ([HOVER, "--set", 'success.require=["tim < 3"]'], "unknown figure 'tim'; did you mean time?"),
+    "success": ([HOVER, "--set", 'success.require=["tim < 3"]'], "unknown metric 'tim'; did you mean time?"),
     "no condition": ([HOVER, "--set", 'success.require=["rmse.z"]'], "'rmse.z' is a number, not true or false"),
     "unlike types": ([HOVER, "--set", "success.require=[\"'a' < 1\"]"], "is a text, '1' is a number"),
     "zero divisor": ([HOVER, "--set", 'success.require=["1/0 > 1"]'], "cannot be computed: division by zero"),
@@ -256,10 +256,10 @@ def test_check_prints_configuration(lapwing):
     ("option", "value", "message"),
     [
         ("--runs", "0", "--runs 0: expected a number from 1 to 10000000"),
-        ("--vary", "vehicle.mass=normal(1", "expected a distribution, normal, uniform"),
+        ("--vary", "vehicle.mass=normal(1", "expected a distribution (normal, uniform"),
         ("--vary", "vehicle.mass", "--vary vehicle.mass: expected KEY=DISTRIBUTION"),
-        ("--design", "lsh", "design lsh: expected one of random, lhs, sobol, grid"),
-        ("--seed", "0", "seed 0: expected a whole number from 1"),
+        ("--design", "lsh", "--design lsh: expected one of random, lhs, sobol, grid"),
+        ("--seed", "0", "--seed 0: expected a whole number from 1"),
         ("--shard", "3/2", "--shard 3/2: expected I/N with I from 1 to N"),
         ("--sweep", "none.csv", "--sweep none.csv: cannot be read"),
         ("--workers", "0", "--workers 0: expected at least 1"),
@@ -296,18 +296,23 @@ def test_campaign_checks_values_before_slow_imports(option, value, message):
         ("import flight.csv --out a.mcap --mapping nanobench", "flight.csv: none of the mapped columns"),
         ("identify hover flight.csv --out a.toml", "--free: missing; name the keys to estimate"),
         ("identify hover flight.csv --mapping m.toml --free a.b --out a.toml", "--free a.b: no number of this name"),
+        ("run hover --log .", "--log .: is a folder; expected the path of an output file"),
+        ("effects hover --only ,", "--only ',': expected names of effects, separated by commas"),
+        ("campaign hover --sweep binary.csv", "binary.csv: cannot be read: not a UTF-8 text file; expected a table"),
+        ("export-library hover --out flight.csv", "flight.csv: is a file; expected the path of an output folder"),
     ],
 )
 def test_process_rejects_input_in_one_line_and_writes_no_file(tmp_path, arguments, message):
     (tmp_path / "m.toml").write_text('[tme]\ncolumn = "t"\nunit = "s"\n')
     (tmp_path / "flight.csv").write_text("a,b\n1,2\n")
+    (tmp_path / "binary.csv").write_bytes(b"\xac\xff")
     command, environment = [sys.executable, "-m", "lapwing", *arguments.split()], os.environ | {"PYTHONPATH": str(ROOT)}
     result = subprocess.run(
         command, cwd=tmp_path, env=environment, capture_output=True, text=True, timeout=300, check=False
     )
     assert (result.returncode, result.stdout, result.stderr.count("\n")) == (2, "", 1)
     assert message in result.stderr
-    assert sorted(os.listdir(tmp_path)) == ["flight.csv", "m.toml"]
+    assert sorted(os.listdir(tmp_path)) == ["binary.csv", "flight.csv", "m.toml"]
 
 
 def test_command_shows_no_traceback():

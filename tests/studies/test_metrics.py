@@ -138,7 +138,7 @@ def test_success_arithmetic_accepts_numbers_only():
 def test_default_success_requires_completed_mission():
     success = load("hover")[Success]
     assert [success.unmet({"outcome": v}) != [] for v in KINDS] == [k > 1 for k in range(len(KINDS))]
-    with pytest.raises(SceneError, match=r"success.require.0: unknown figure 'rmse.zz'; did you mean rmse.z\?"):
+    with pytest.raises(SceneError, match=r"success.require.0: unknown metric 'rmse.zz'; did you mean rmse.z\?"):
         check_success(load("hover", {"success.require": ["rmse.zz < 1"]}))
 
 

@@ -30,7 +30,7 @@ def dask(address: str, notify: Callable[[str], None] = lambda line: None) -> Wor
     try:
         client = Client(address, timeout=SCHEDULER_TIMEOUT, set_as_default=False)
     except (OSError, TimeoutError, ValueError) as fault:
-        raise ValueError(f"--cluster {address}: no Dask scheduler answers: {fault}") from None
+        raise ValueError(f"--cluster {address}: no Dask scheduler answers: {fault}; expected tcp://HOST:PORT") from None
 
     def run(call: Callable[..., Any], tasks: Iterable[tuple]) -> Iterator[tuple[int, Any]]:
         with client:

@@ -106,7 +106,7 @@ def parse(text: str) -> Distribution:
     """
     match = _FORM.fullmatch(text.strip())
     if not match or match[1] not in KINDS:
-        raise ValueError(f"expected a distribution, {', '.join(KINDS)}: normal(10.4, 0.2), got {text!r}")
+        raise ValueError(f"expected a distribution ({', '.join(KINDS)}), for example normal(10.4, 0.2), got {text!r}")
     arguments = _arguments(match[2])
     try:
         return KINDS[match[1]](*arguments)

@@ -157,13 +157,17 @@ def begin(path: Path, plan: Plan, about: dict[str, Any]) -> Folder:
     existing = read(path).about  # another machine may have started the campaign
     differing = [name for name in about if name != "path" and existing.get(name) != about[name]]
     if differing:
-        raise ValueError(f"{path}: contains another campaign ({', '.join(differing)} differ); expected a new folder")
+        raise ValueError(
+            f"{path}: contains another campaign (differences: {', '.join(differing)}); expected a new folder"
+        )
     return Folder(path, plan, about)
 
 
 def _create(path: Path, about: dict[str, Any]) -> None:
     """Create the folder of a campaign."""
-    if path.exists() and (not path.is_dir() or any(not _may_be_new(file) for file in path.iterdir())):
+    if path.exists() and not path.is_dir():
+        raise ValueError(f"{path}: is a file; expected a new folder, or the folder of a campaign")
+    if path.exists() and any(not _may_be_new(file) for file in path.iterdir()):
         raise ValueError(f"{path}: contains other files; expected a new folder, or the folder of a campaign")
     with write_errors(path):
         (path / "shards").mkdir(parents=True, exist_ok=True)

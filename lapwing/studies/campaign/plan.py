@@ -99,18 +99,18 @@ def plan(
     if option := Plan(path, (), seed, 1, distributions, sweep_rows).option(SEED) or fixed:
         raise ValueError(f"{option} {SEED}: each run has its own seed; use --seed")
     if design not in _DESIGNS:
-        raise ValueError(f"design {design}: expected one of {', '.join(_DESIGNS)}")
+        raise ValueError(f"--design {design}: expected one of {', '.join(_DESIGNS)}")
     if design in ("lhs", "sobol") and not distributions:
-        raise ValueError(f"design {design}: expected a key that varies")
+        raise ValueError(f"--design {design}: expected a key that varies")
     points = math.prod(len(d.values) for _, d in distributions if d.values)
     if design == "grid" and not any(d.values for _, d in distributions):
-        raise ValueError("design grid: expected a key that varies by choice(...) or linspace(...)")
+        raise ValueError("--design grid: expected a key that varies by choice(...) or linspace(...)")
     if runs is None:
         runs = len(sweep_rows) or (points if design == "grid" else 100)
     if not 1 <= runs <= MAX_RUNS:
         raise ValueError(f"--runs {runs}: expected a number from 1 to {MAX_RUNS}")
     if not 1 <= seed < 2**63 // SEED_STRIDE:
-        raise ValueError(f"seed {seed}: expected a whole number from 1 to {2**63 // SEED_STRIDE - 1}")
+        raise ValueError(f"--seed {seed}: expected a whole number from 1 to {2**63 // SEED_STRIDE - 1}")
     return Plan(path, overrides, seed, runs, distributions, sweep_rows, design)
 
 

@@ -39,7 +39,7 @@ def _table(console: Console, title: str, study: Study, active: bool) -> None:
     if not _sorted_rows(study, active):
         return
     console.print(title)
-    heads = ("effect", "hovering\n[ns]", "share", "on ground\n[ns]", "path [m]", "end [m]", "energy")
+    heads = ("effect", "hover\n[ns]", "share", "ground\n[ns]", "path\n[m]", "end\n[m]", "energy")
     rows = table(*heads, box=SIMPLE, pad_edge=False, collapse_padding=True)  # 80 columns hold all digits
     for row in _sorted_rows(study, active):
         if row.influence is None:
@@ -58,6 +58,8 @@ def _table(console: Console, title: str, study: Study, active: bool) -> None:
 
 
 def _cost(difference: float, noise: float) -> str:
+    if abs(difference) >= 999.5:
+        return f"{difference:.0f}"
     return f"{difference:.3g}" if abs(difference) > noise else f"< {noise:.2g}"
 
 

@@ -188,7 +188,7 @@ def _smallest(
     """
     while removable:
         smallest = without(tables, removable)
-        report(f"without {', '.join(removable)} together")
+        report(f"without {', '.join(removable)}{' together' if len(removable) > 1 else ', to find the smallest set'}")
         distance = influence(reference, next(iter(pool.fly([smallest])))).trajectory
         if distance <= within:
             return smallest, distance

@@ -17,7 +17,8 @@ CORRELATED = 0.8  # correlation of two estimates above which it is printed
 def show(console: Console, identification: Identification) -> None:
     """Print estimates, correlations, undetermined parameters, and the errors on held-out flights."""
     fit = identification.fit
-    title = f"{identification.scene}: output error on {len(identification.used)} flights"
+    n = len(identification.used)
+    title = f"{identification.scene}: output error on {n} flight{'s' if n > 1 else ''}"
     rows = table("parameter", "before", "estimate", "standard error", title=title)
     for key, before, value, error in zip(fit.keys, fit.start, fit.values, fit.standard_errors, strict=True):
         rows.add_row(key, f"{before:.5g}", f"{value:.5g}", f"{error:.2g}")

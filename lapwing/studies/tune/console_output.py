@@ -3,6 +3,7 @@
 import math
 from collections.abc import Iterator
 
+from rich.box import SIMPLE
 from rich.console import Console
 
 from lapwing.services.autopilot.margins import Margins
@@ -65,7 +66,7 @@ def tables(tuning: Tuning) -> Iterator[Rows]:
 def show(console: Console, tuning: Tuning) -> None:
     """Print the tables, failures in red."""
     for rows in tables(tuning):
-        shown = table(*rows.heads, title=rows.title)
+        shown = table(*rows.heads, title=rows.title, box=SIMPLE, pad_edge=False, collapse_padding=True)
         for k, row in enumerate(rows.rows):
             shown.add_row(*row, style="bold red" if k in rows.failed else None)
         console.print(shown)
@@ -82,7 +83,7 @@ def cells(m: Margins) -> tuple[str, ...]:
 
 
 def _margins(tuning: Tuning) -> Rows:
-    heads = ("loop", "gains", "crossover, rad/s", "phase margin, °", "gain margin, dB", "reduction, dB")
+    heads = ("loop", "gains", "crossover,\nrad/s", "phase\nmargin, °", "gain\nmargin, dB", "reduction,\ndB")
     rows = Rows("Margins of the loops before and after", *heads, caption=_MARGINS)
     for name in tuning.after.margins:
         for review in (tuning.before, tuning.after):

@@ -15,7 +15,8 @@ UNITS = dict(zip(FIELDS, ("m", "m/s", "rad", "rad/s", "m/s^2", "W"), strict=True
 
 def show(console: Console, validation: Validation) -> None:
     """Print the errors, those of the baselines, warnings, and the skipped flights."""
-    extent = f"{validation.windows} windows, {len(validation.flights)} flights"
+    n = len(validation.flights)
+    extent = f"{validation.windows} windows, {n} flight{'s' if n > 1 else ''}"
     heads, rows = error_table(validation)
     console.print(f"{validation.scene}: mean absolute prediction error, {extent}", soft_wrap=True)
     table = Table(box=SIMPLE, pad_edge=False, collapse_padding=True)  # fits in 80 columns

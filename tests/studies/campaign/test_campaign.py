@@ -113,6 +113,8 @@ def test_folder_of_other_campaign_is_rejected_unchanged(complete, tmp_path):
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(ValueError, match="contains other files"):
         begin_campaign(tmp_path)
+    with pytest.raises(ValueError, match=r"notes.txt: is a file; expected a new folder"):
+        begin_campaign(tmp_path / "notes.txt")
     (tmp_path / "c" / "shards").mkdir(parents=True)  # another machine has just started
     assert begin_campaign(tmp_path / "c")[0].missing()
 

@@ -61,7 +61,7 @@ def test_discrete_distribution_has_equal_probabilities(text, values):
         (f"uniform(0, 1{400 * '0'})", "expected low <= high"),
         ("choice([1, 2)", "is not a TOML value"),
         ("choice()", "choice: expected at least one value"),
-        ("gauss(1, 2)", f"expected a distribution, {', '.join(KINDS)}"),
+        ("gauss(1, 2)", f"expected a distribution ({', '.join(KINDS)})"),
         ("3.0", "expected a distribution"),
     ],
 )
@@ -157,10 +157,10 @@ def test_rejection_text_is_independent_of_folder():
     [
         ({"runs": 40_000_000_000}, "--runs 40000000000: expected a number from 1 to 10000000"),
         ({"runs": 0}, "--runs 0: expected a number from 1 to 10000000"),
-        ({"seed": 0}, "seed 0: expected a whole number from 1 to 2147483647"),
-        ({"design": "halton"}, "design halton: expected one of random, lhs, sobol, grid"),
-        ({"design": "lhs"}, "design lhs: expected a key that varies"),
-        ({"design": "grid", "vary": {"a": uniform(0, 1)}}, r"design grid: expected a key that varies by choice"),
+        ({"seed": 0}, "--seed 0: expected a whole number from 1 to 2147483647"),
+        ({"design": "halton"}, "--design halton: expected one of random, lhs, sobol, grid"),
+        ({"design": "lhs"}, "--design lhs: expected a key that varies"),
+        ({"design": "grid", "vary": {"a": uniform(0, 1)}}, r"--design grid: expected a key that varies by choice"),
         ({"sweep": "none.csv"}, "--sweep none.csv: cannot be read: no such file"),
     ],
 )

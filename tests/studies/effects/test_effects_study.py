@@ -239,6 +239,8 @@ def study():
         Row("gravity", True, Influence(math.inf, math.inf, math.inf, "falls"), 1.0, 2.0),
         Row("wind", False, Influence(0.5, 0.1, 0.02), 20.0, 30.0),
         Row("gyroscopic_torque", False, Influence(0.00012, 0.00011, -0.0123), -1234.5, -1234.0),
+        Row("rotor_interference", False, Influence(4.5e-05, 5.6e-17, 3.1e-08), 2684.0, 3630.0),
+        Row("multirotor_ground_effect", False, Influence(8.1e-06, 0.0, -0.066), 5.6, 1970.0),
         Row("gust", False, None, math.nan, math.nan, "gust.peak: field required"),
     )
     return Study("hover", 0.01, 80.0, 500.0, rows, ("gravity",), 0.0, 80.0, 500.0, (1.5, 3.0), ("drone1",))
@@ -251,7 +253,7 @@ def test_table_json_and_plot(tmp_path, capsys):
     text = capsys.readouterr().out
     assert max(map(len, text.splitlines())) <= 80
     assert "…" not in text  # no number is cut
-    assert "path [m]" in text
+    assert ["effect", "[ns]", "share", "[ns]", "[m]", "[m]", "energy"] in [line.split() for line in text.splitlines()]
     assert "ends early" in text
     assert "< 1.5" in text  # cost of gravity, below the resolution of the measurement
     assert "not flown: gust.peak: field required" in text
