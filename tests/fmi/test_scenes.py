@@ -1,10 +1,9 @@
 """Every shipped scene as FMUs: their outputs are those of the run, bit for bit.
 
 The FMU of a scene's vehicle contains all parts. Of the FMUs of single parts each scene has one, another one than the
-scene before: all parts of all scenes take minutes to compile. The FMUs of a scene alternate between FMI 2.0 and 3.0, and
-so do the scenes of a part. `test_fmu.py` and `test_propeller_failures.py` compare both versions of one part. FMPy finds
-no fault in any FMU. `LAPWING_FMU_TICKS=100000 pytest tests/fmi/test_scenes.py -m long` compares whole flights and all
-parts.
+scene before, because those of all parts of all scenes take minutes to compile. The FMUs of a scene alternate between
+FMI 2.0 and 3.0. `test_fmu.py` and `test_propeller_failures.py` compare both versions of one part. FMPy finds no fault
+in any FMU. `LAPWING_FMU_TICKS=100000 pytest tests/fmi/test_scenes.py -m long` compares whole flights and all parts.
 """
 
 import os
