@@ -50,6 +50,7 @@ def draws(key, n=200_000):
     return out
 
 
+@pytest.mark.long
 def test_normal_draws_are_normal_and_white():
     x = draws(noise.stream_key(1, "drone1", "imu"))
     n = x.size

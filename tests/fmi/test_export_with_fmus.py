@@ -104,6 +104,7 @@ def test_exchanged_fmu_of_package_has_digest_of_scene(folder: Path) -> None:
     assert digest(package) == digest(folder / "scene.toml", *OPTIONS)
 
 
+@pytest.mark.long
 def test_package_without_fmu_flies_without_it(folder: Path) -> None:
     """A tool may remove a component with its connections: the effect computes the battery again."""
     package = folder / "removed.ssp"
@@ -157,6 +158,7 @@ def test_export_needs_permission_for_fmus(folder: Path, command: str) -> None:
     assert not out.is_file()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("command", ["export-fmu", "export-library"])
 def test_plant_with_permission_is_exported(folder: Path, command: str) -> None:
     """The plant has the named input of its battery."""

@@ -74,6 +74,7 @@ def test_exported_package_flies_with_bits_of_scene(folder: Path, fmi: int) -> No
     assert truth(log) == truth(folder / "plain.mcap")
 
 
+@pytest.mark.long
 def test_override_applies_to_package(folder: Path) -> None:
     log = folder / "short.mcap"
     options = ("--mode", "single-process", "--set", "run.duration=1.0")

@@ -59,6 +59,7 @@ def rows(state):
     return np.column_stack(state[1:6])
 
 
+@pytest.mark.long
 def test_every_member_is_bit_for_bit_single_vehicle(batch):
     batch.reset()
     volts = np.linspace(31.0, 35.0, 4 * N).reshape(N, 4)  # some stay on the ground, some take off

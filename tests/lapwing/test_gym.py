@@ -65,6 +65,7 @@ def test_observations_stay_within_bounds_under_random_actions(task):
     assert ends > 0
 
 
+@pytest.mark.long
 def test_invalid_vehicle_is_lost_and_observed_within_bounds():
     environments = many("Hover", 2)
     environments.reset(seed=1)

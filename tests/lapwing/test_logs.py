@@ -295,7 +295,7 @@ def test_unchanged_types_of_other_version_are_replayed(lapwing, old):
         (["export", "whole.mcap", "--csv", "csv", "--topics", "/x"], "the log has no topic /x; it has /clock"),
         (["export", "foreign.mcap", "--csv", "csv"], "unknown message type a"),
         (["export", "whole.mcap", "--csv", "whole.mcap"], "is the same file as FILE"),
-        (["export", "whole.mcap", "--csv", "text.mcap"], "text.mcap: cannot be written"),
+        (["export", "whole.mcap", "--csv", "text.mcap"], "text.mcap: is a file; expected the path of an output folder"),
     ],
 )
 def test_bad_input_is_one_line(lapwing, tmp_path, foreign, arguments, output):

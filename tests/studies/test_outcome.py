@@ -149,6 +149,7 @@ def test_mission_target_is_end_of_trajectory():
     assert not target.is_longer
 
 
+@pytest.mark.long
 def test_gps_loss_ends_in_failsafe_and_fails_by_default():
     overrides = {"sensors.gps.faults": [{"kind": "dropout", "start": 5.0}]}
     flight = lapwing.fly("delivery_mission", overrides)

@@ -59,6 +59,7 @@ def momentum(results):
     return sum(p.body.mass * np.array(s.motion.velocity_world) for p, s in results)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("restitution", [1.0, 0.5])
 def test_central_impact_follows_newtons_law(restitution):
     meeting = (DRONE, (0.0, 0.0, 0.0), (2.0, 0.0, 0.0)), (LIGHT, (1.05, 0.0, 0.0), (-1.0, 0.0, 0.0))

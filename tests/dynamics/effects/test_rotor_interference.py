@@ -89,6 +89,7 @@ def test_mean_over_disc_is_accurate():
     assert worst < 0.02
 
 
+@pytest.mark.long
 def test_hover_is_unchanged(drone, situation):
     thrust, torque = changes(drone, situation(speed=(SPEED,) * 4))
     assert thrust == pytest.approx([0.0] * 4, abs=1e-12)

@@ -21,6 +21,7 @@ RATIO, SPEED, SLACK, SECONDS, INTERVAL = 0.1, 1.5, 0.02, 0.5, 4e-3
 FREQUENCY = 8.0  # [rad/s], so slow that RK4 has no error while the cable is taut
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("steps", [1, 4])
 def test_carrier_rebounds_from_taut_cable_as_damped_spring(steps):
     """Without weight and with a fixed load, every step is as accurate as the tolerance."""

@@ -59,6 +59,7 @@ def rotation(q):
     return np.array(quaternion.rotation_matrix(tuple(q))).reshape(3, 3)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("driven", ["speed", "torque"])
 def test_identical_to_general_path(driven):
     rng = np.random.default_rng(31)

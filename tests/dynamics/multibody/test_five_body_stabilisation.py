@@ -54,6 +54,7 @@ def test_projection_equals_general_engine(driven):
     assert max(constraint_violation(p, again)) < 1e-12
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("hold", [project, partition])
 @pytest.mark.parametrize("driven", ["speed", "torque"])
 def test_drift_is_removed_and_consistent_state_unchanged(hold, driven):
@@ -92,6 +93,7 @@ def test_order_four_with_every_stabilisation(stabilisation):
     assert np.all(orders > 3.7), orders
 
 
+@pytest.mark.long
 def test_energy_of_free_tumbling_drone_with_projection():
     drone, p, x, *_ = scene(np.random.default_rng(45), "torque")
     free = p._replace(

@@ -35,6 +35,7 @@ def five(drone, omega, speeds, gravity=GRAVITY, angles=(0.1, 0.4, 0.7, 1.0)):
     return p, assembled_state(p, BodyState(NOWHERE, quaternion.NO_ROTATION, NOWHERE, omega), angles, speeds)
 
 
+@pytest.mark.long
 def test_pitch_through_90_degrees():
     """Euler angles stop with a clear error on the pole; quaternions pass it. The baseline, which only checks for
     division by zero, passes the pole at a distance of 2e-3 rad silently, with a wrong result."""

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from multibody_angles import euler_from_quaternion, quaternion_from_euler
+from multibody_energy import energy
 from test_augmented import PAPER
 
 from lapwing.dynamics.lie.quaternion import Quaternion
@@ -10,7 +11,7 @@ from lapwing.dynamics.multibody.delivery_drone import delivery_drone
 from lapwing.dynamics.multibody.five_bodies import BodyState, arrays, machine
 from lapwing.dynamics.multibody.five_body_stabilisation import assembled_state
 from lapwing.dynamics.multibody.mechanisms import drone_system, four_bars
-from lapwing.dynamics.multibody.simulation import energy, simulate
+from lapwing.dynamics.multibody.simulation import simulate
 
 SPEEDS = (40.0, -30.0, 35.0, -45.0)
 

@@ -76,6 +76,7 @@ def reference(p):
     return y, crossings
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("wind", [(0.5, -0.3, -5.5), (0.5, -0.3, 4.0)], ids=["from above", "from below"])
 @pytest.mark.parametrize(("integrator", "steps"), [("rk4_renormalised", 4), ("rk8_renormalised", 1)])
 def test_crossing_of_limit_is_as_accurate_as_tolerance(integrator, steps, wind):

@@ -56,6 +56,7 @@ def broken_by_reference(p):
     return y
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("integrator", "bound"), [("rk4_renormalised", 1e-10), ("rk8_renormalised", 1e-12)])
 def test_faults_between_ticks_are_exact(integrator, bound):
     p, motion = fly(BROKEN, START, integrator=integrator)

@@ -142,6 +142,7 @@ def test_moment_vanishes_at_desired_attitude_and_opposes_error():
     )
 
 
+@pytest.mark.long
 def test_published_flight_reaches_path_formation_and_attitude():
     p, x0 = published()
     _, rows = simulate(get("rkmk4"), p, x0, 5.0 / 2000, 2000, every=1000)

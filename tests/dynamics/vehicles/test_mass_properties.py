@@ -34,6 +34,7 @@ def tumbled(inertia, products, attitude, omega):
     return Rotation.from_quat(np.roll(m.attitude, -1)), np.array(m.omega_body)
 
 
+@pytest.mark.long
 def test_tumbling_is_independent_of_body_axes():
     omega = np.array([3.0, 0.2, -1.0])
     attitude, rate = tumbled(np.diag(PRINCIPAL), (0.0, 0.0, 0.0), Rotation.identity(), omega)
@@ -68,6 +69,7 @@ def test_positions_are_moved_to_centre_of_mass_once():
     assert isinstance(moved, Airframe)
 
 
+@pytest.mark.long
 def test_hover_thrusts_balance_offset_centre_of_mass():
     """The smallest thrusts without torque are F = W / 4 (1 + (c . r) / l^2), r from the hubs' centre."""
     c, arm = 0.017, 0.35171491

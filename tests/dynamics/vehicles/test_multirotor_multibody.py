@@ -100,6 +100,7 @@ def hinges(p, state, volts):
     return joints(MultirotorDrive(p, p.body, state.memory, volts), 0.0, state.motion)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("drive", ["torque", "speed"])
 def test_hinges_carry_thrust_and_drives_hold_drag(drive):
     p, state, volts = hovering(DRONE, drive)

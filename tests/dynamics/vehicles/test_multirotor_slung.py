@@ -81,6 +81,7 @@ def test_load_on_fixed_hook_is_pendulum():
     assert np.diff(crossings).mean() == pytest.approx(period, rel=5e-4)
 
 
+@pytest.mark.long
 def test_with_taut_cable_energy_and_both_momenta_are_kept():
     p = vehicle(SLING)
     x = begin(p, (0.05, 0.3, 97.9), (2.0, 0.5, 0.0), omega=(0.3, -0.2, 0.5))

@@ -73,6 +73,7 @@ def momenta(mass, inertia, centre, motion):
     return linear, np.cross(np.array(motion.position_world) + arm, linear) + own
 
 
+@pytest.mark.long
 def test_release_conserves_momentum_of_both():
     """In free space the vehicle's momentum is constant after the release; with the box's it equals the one before."""
     p, state = flying({"payload_release": {}})
@@ -93,6 +94,7 @@ def test_release_conserves_momentum_of_both():
     assert after[1] + box[1] == pytest.approx(before[1], abs=1e-6)
 
 
+@pytest.mark.long
 def test_carried_payload_acts_as_part_of_body():
     p, state = flying({"payload_release": {}, "gravity": {}, "rotor_thrust": {}})
     plain, other = flying({"gravity": {}, "rotor_thrust": {}})

@@ -126,6 +126,7 @@ def stacked(drone):
     return drone.model_copy(update={"rotors": r.model_copy(update={"position": hubs, "spin_direction": spins})})
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("speed", [0.0, 6.0, 14.0])
 def test_trim_of_coaxial_rotors_equals_plant(speed):
     """The plant with `coaxial_interference` hovers at the card's trim and draws the card's current."""

@@ -42,6 +42,7 @@ def begin(link, script):
     return background
 
 
+@pytest.mark.long
 def test_every_step_is_answered(link):
     def script(peer):
         return [peer.exchange((1000 + k,) * 4 + (0,) * 12) for k in range(101)]

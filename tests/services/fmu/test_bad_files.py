@@ -108,6 +108,7 @@ def test_large_file_is_not_read(tmp_path: Path) -> None:
     assert_rejected(tmp_path, "has 5 GB; expected at most 4 GB")
 
 
+@pytest.mark.long
 def test_damaged_fmu_member_is_rejected_in_one_line(tmp_path: Path, files: Files) -> None:
     path = tmp_path / "bad.fmu"
     table = "resources/table.csv"  # no part that is read before the FMU is extracted

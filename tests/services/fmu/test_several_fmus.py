@@ -80,6 +80,7 @@ def test_fmus_before_and_after_autopilot_step_in_one_tick(folder: Path, mode: st
     assert np.array_equal(plain.motor_voltage, two.motor_voltage)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(("source", "gain"), [(FILTER, 3.0), ("filter.y", 6.0)])
 def test_fmu_reads_port_of_lapwing_or_of_other_fmu(folder: Path, source: str, gain: float) -> None:
     log = folder / "column.mcap"

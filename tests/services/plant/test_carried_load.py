@@ -111,6 +111,7 @@ def test_strictest_accuracy_keeps_load_substeps_above_round_off(tmp_path):
     assert [plant.others.load.tolerance for plant in plants if plant.others.load] == [LEAST_TOLERANCE]
 
 
+@pytest.mark.long
 def test_first_carrier_publishes_load(recorded_flight):
     assert "left/body_states" in recorded_flight.topics
     assert "right/body_states" not in recorded_flight.topics

@@ -56,6 +56,7 @@ def test_errors_decrease_with_step_rate_and_delay():
     assert delay[0] / delay[1] == pytest.approx(2.0, rel=0.3)  # delay of one communication step, first order
 
 
+@pytest.mark.long
 def test_accuracy_holds_from_take_off_to_rest():
     """Steps of 4 ms and contact at the accuracy, against an eighth of the step and 1/1000 of the accuracy."""
     coarse, fine = (

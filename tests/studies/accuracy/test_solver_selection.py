@@ -88,6 +88,7 @@ def test_steps_finer_than_those_of_round_off_can_be_selected(measured_titles, mo
     assert solver_selection.overrides(scene, lambda text: None)[1] == "solver.step=0.002"
 
 
+@pytest.mark.long
 def test_fleet_has_one_solver_that_meets_accuracy_of_each_vehicle(measured_titles, monkeypatch):
     """Each airframe is measured once."""
     points = [Point("rk4", 4, "s", h, 1e-12, 1e-5 / h, 1, {}) for h in (0.004, 0.002, 0.001)]

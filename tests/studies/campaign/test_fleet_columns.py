@@ -55,6 +55,7 @@ def test_each_flight_of_fleet_has_all_vehicles():
         assert set(flight.fleet) == {"left", "right", "scout"}
 
 
+@pytest.mark.long
 def test_row_has_worst_of_vehicles_and_each_of_them(folder):
     path, output = folder
     result = Results(read(path))

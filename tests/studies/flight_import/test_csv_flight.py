@@ -48,6 +48,7 @@ def test_columns_become_si_quantities(flight, path):
     assert result.valid.all()
 
 
+@pytest.mark.long
 def test_gzip_has_equal_recording(path, tmp_path):
     packed = tmp_path / "flight.csv.gz"
     packed.write_bytes(gzip.compress(path.read_bytes()))

@@ -1,5 +1,6 @@
 """Random scenes: valid scenes fly, and repeated flights are bit-for-bit identical."""
 
+import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
@@ -7,6 +8,7 @@ from lapwing.studies.stability.cases.random_scenes import flights
 from lapwing.studies.stability.flights import finite
 
 
+@pytest.mark.long
 @given(st.integers(0, 2**31))
 @settings(max_examples=8, deadline=None, suppress_health_check=[HealthCheck.too_slow])
 def test_valid_random_scene_flies_repeatably(seed):

@@ -44,6 +44,7 @@ def test_own_flight_is_predicted_to_rounding(plant, flights):
     assert np.abs(result.rate).max() < 1e-6
 
 
+@pytest.mark.long
 def test_trim_recovers_constant_force(plant, flights):
     pushed = PlantRows(SCENE, INTERVAL, ["effects.body_wrench.force=[0.02, -0.01, 0.03]"])
     (flight,) = simulated(pushed, 6.0, [4], noise=0.0)
