@@ -22,13 +22,14 @@ pytestmark = pytest.mark.long
 LOCKED, FREE = '{time=2.601, propeller=2, failure="locked"}', '{time=2.602, propeller=1, failure="free"}'
 TORN_OFF = '{time=2.605, propeller=4, failure="torn_off"}'  # in the tick after that of the others
 FAILURES = f"[{LOCKED}, {FREE}, {TORN_OFF}]"
+ONE_FAILURE = {"multibody.event": f"[{LOCKED}]", "run.duration": 2.8}  # each failure adds a kernel
 SCENE = {"vehicle.model": "multibody", "run.duration": 3.6, "success.require": "[]"}  # it falls from 1 m
 TICK, FIRST, SECOND = 0.004, 2.604, 2.608  # [s]; ends of the ticks in which propellers fail
 SPEED = "truth.rotor_speed"
 
 
 def setup_of(**overrides: object) -> RunConfig:
-    return scene_config("delivery_mission", **SCENE, **{"multibody.event": FAILURES, **overrides})
+    return scene_config("delivery_mission", **{**SCENE, "multibody.event": FAILURES, **overrides})
 
 
 @pytest.fixture(scope="module")
@@ -76,16 +77,15 @@ def test_vehicle_has_recorded_outputs(vehicle: Path) -> None:
 
 
 def test_plant_in_euler_angles_has_recorded_outputs(tmp_path: Path) -> None:
-    """The step in Euler angles creates arrays, in memory of the runtime. One failure, as each adds a kernel."""
-    form = {"multibody.coordinates": "euler", "multibody.event": f"[{LOCKED}]", "run.duration": 2.8}
-    recorded = RecordedPorts(setup_of(**form))
+    """The step in Euler angles creates arrays, in memory of the runtime."""
+    recorded = RecordedPorts(setup_of(**ONE_FAILURE, **{"multibody.coordinates": "euler"}))
     exported = export_fmu(recorded.setup, "plant", tmp_path / "part.fmu")
     assert validate_fmu(str(tmp_path / "part.fmu")) == []
     assert_recorded_outputs(tmp_path / "part.fmu", exported, recorded)
 
 
 def test_fmi_2_has_recorded_outputs(tmp_path: Path) -> None:
-    recorded = RecordedPorts(setup_of())
+    recorded = RecordedPorts(setup_of(**ONE_FAILURE))
     path = tmp_path / "vehicle.fmu"
     export_fmu(recorded.setup, "vehicle", path, 2)
     assert validate_fmu(str(path)) == []
@@ -105,7 +105,7 @@ def test_library_has_recorded_outputs(part: str, tmp_path: Path) -> None:
 
 
 def test_vehicle_of_fleet_fails_alone(tmp_path: Path) -> None:
-    failing = {"vehicle.0.model": "multibody", "vehicle.0.multibody.event": f"[{LOCKED}]"}
+    failing = {"vehicle.0.model": "multibody", "vehicle.0.multibody.event": ONE_FAILURE["multibody.event"]}
     native, recorded = built(tmp_path, "fleet", "plant", **failing, **{"run.duration": 2.8, "success.require": "[]"})
     native.compare(recorded, 0, recorded.ticks)
 
