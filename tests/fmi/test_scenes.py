@@ -1,9 +1,9 @@
-"""Every shipped scene as FMUs: their outputs are those of the run, bit for bit.
+"""Every shipped scene as an FMU: its outputs are those of the run, bit for bit.
 
-The FMU of a scene's vehicle contains all parts. Of the FMUs of single parts each scene has one, another one than the
-scene before, because those of all parts of all scenes take minutes to compile. The FMUs of a scene alternate between
-FMI 2.0 and 3.0. `test_fmu.py` and `test_propeller_failures.py` compare both versions of one part. FMPy finds no fault
-in any FMU. `LAPWING_FMU_TICKS=100000 pytest tests/fmi/test_scenes.py -m long` compares whole flights and all parts.
+Each scene exports one part, by turns a service or the whole vehicle, because all parts of all scenes take minutes to
+compile. FMI 2.0 and 3.0 alternate. `test_fmu.py` and `test_propeller_failures.py` compare both versions of one part.
+FMPy finds no fault in any FMU. `LAPWING_FMU_TICKS=100000 pytest tests/fmi/test_scenes.py -m long` compares all parts
+over whole flights.
 """
 
 import os
@@ -30,15 +30,14 @@ TICKS = int(os.environ.get("LAPWING_FMU_TICKS", DEFAULT_TICKS))
 def test_parts_have_recorded_outputs(scene: str, tmp_path: Path) -> None:
     whole = scene_config(scene)
     setup = scene_config(scene, **{"run.duration": min(whole.duration, TICKS * whole.interval)})
-    own = [part for part in PARTS if part in setup.services]
-    index, recorded = SCENES.index(scene), {}
+    parts = [part for part in PARTS if part in setup.services or (part == VEHICLE and scene not in FIRMWARE)]
+    index, whole_run = SCENES.index(scene), None
+    if TICKS == DEFAULT_TICKS:
+        parts = [parts[index % len(parts)]]
     if scene not in FIRMWARE:
-        own = own if TICKS > DEFAULT_TICKS else [own[index % len(own)]]
-        recorded = dict.fromkeys([*own, VEHICLE], RecordedPorts(setup))
-    for part in own:
-        recorded.setdefault(part, None)
-    for number, (part, ports) in enumerate(recorded.items(), index // len(PARTS)):
-        ports = ports or DrivenService(setup, part)
+        whole_run = RecordedPorts(setup)
+    for number, part in enumerate(parts, index // len(PARTS)):
+        ports = whole_run or DrivenService(setup, part)
         assert ports.ticks > min(setup.last_tick, TICKS // 2)
         path = tmp_path / f"{part}.fmu"
         exported = export_fmu(setup, part, path, 2 + number % 2, cpu="x86-64-v3")
