@@ -15,6 +15,8 @@ from small_fmu import write_small_fmu
 fmpy = pytest.importorskip("fmpy")
 from lxml import etree  # noqa: E402
 
+pytestmark = pytest.mark.long
+
 HOVER = Path("lapwing/scenes/hover.toml").resolve()
 SCENE = """
 [effects.wind_constant]
@@ -87,13 +89,10 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.long
 def test_package_has_digest_of_scene(folder: Path) -> None:
     assert digest(folder / "a.ssp") == digest(folder / "scene.toml", *OPTIONS)
 
 
-@pytest.mark.long
-@pytest.mark.long
 def test_exchanged_fmu_of_package_has_digest_of_scene(folder: Path) -> None:
     """Without its annotation the FMU of the battery takes connections and start values from the package."""
     package = folder / "exchanged.ssp"
@@ -104,7 +103,6 @@ def test_exchanged_fmu_of_package_has_digest_of_scene(folder: Path) -> None:
     assert digest(package) == digest(folder / "scene.toml", *OPTIONS)
 
 
-@pytest.mark.long
 def test_package_without_fmu_flies_without_it(folder: Path) -> None:
     """A tool may remove a component with its connections: the effect computes the battery again."""
     package = folder / "removed.ssp"
@@ -158,7 +156,6 @@ def test_export_needs_permission_for_fmus(folder: Path, command: str) -> None:
     assert not out.is_file()
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("command", ["export-fmu", "export-library"])
 def test_plant_with_permission_is_exported(folder: Path, command: str) -> None:
     """The plant has the named input of its battery."""

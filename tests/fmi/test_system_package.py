@@ -12,6 +12,8 @@ pytest.importorskip("fmpy")
 
 from fmpy.ssp.ssd import read_ssd
 
+pytestmark = pytest.mark.long
+
 STRUCTURE = "SystemStructure.ssd"
 NOTE = '<ssc:Annotation type="org.lapwing.part">'
 HOVER = ("--mode", "single-process", "--set", "run.duration=3.0", "--set", "success.require=[]")
@@ -64,8 +66,6 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return path
 
 
-@pytest.mark.long
-@pytest.mark.long
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_exported_package_flies_with_bits_of_scene(folder: Path, fmi: int) -> None:
     log = folder / f"native{fmi}.mcap"
@@ -74,7 +74,6 @@ def test_exported_package_flies_with_bits_of_scene(folder: Path, fmi: int) -> No
     assert truth(log) == truth(folder / "plain.mcap")
 
 
-@pytest.mark.long
 def test_override_applies_to_package(folder: Path) -> None:
     log = folder / "short.mcap"
     options = ("--mode", "single-process", "--set", "run.duration=1.0")
@@ -83,7 +82,6 @@ def test_override_applies_to_package(folder: Path) -> None:
     assert len(truth(log)) == 251
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_fmu_in_package_takes_place_of_part(folder: Path, fmi: int) -> None:
     package = changed(folder / f"hover{fmi}.ssp", folder / f"foreign{fmi}.ssp", foreign("autopilot"))
@@ -127,7 +125,6 @@ def nested(package: Path, out: Path) -> Path:
     return out
 
 
-@pytest.mark.long
 def test_system_in_system_flies_like_flat_one(folder: Path, tmp_path: Path) -> None:
     flat = changed(folder / "hover3.ssp", tmp_path / "flat.ssp", foreign("autopilot"))
     package, log = nested(flat, tmp_path / "nested.ssp"), tmp_path / "nested.mcap"
@@ -158,7 +155,6 @@ def test_connectors_have_types(folder: Path, fmi: int) -> None:
     assert all(len(each) == 1 for each in connectors.values())
 
 
-@pytest.mark.long
 def test_fmpy_flies_package(folder: Path) -> None:
     from fmpy.ssp.simulation import simulate_ssp
 
@@ -167,7 +163,6 @@ def test_fmpy_flies_package(folder: Path) -> None:
     assert height[-1] == pytest.approx(1.35, abs=0.01)  # a Jacobi coupling: not the bits of the scene
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("changes", "message"),
     [
@@ -204,7 +199,6 @@ def test_invalid_package_is_one_line(folder: Path, tmp_path: Path, changes: list
     assert not (tmp_path / "a.mcap").exists()
 
 
-@pytest.mark.long
 def test_damaged_package_is_one_line(folder: Path, tmp_path: Path) -> None:
     path = tmp_path / "bad.ssp"
     for content, message in ((b"no archive", "not a package"), (b"", "not a package")):
@@ -236,7 +230,6 @@ def test_scene_file_and_parameters_of_package_are_read(folder: Path, tmp_path: P
     assert "services.autopilot.start.parameters.autopilot.none: unknown variable" in done.stderr
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

@@ -14,6 +14,8 @@ from lapwing.kernels import kernel
 from lapwing.kernels.row_packing import pack_row
 from lapwing.services.scene_resolver import load, resolve
 
+pytestmark = pytest.mark.long
+
 N = 19  # more than a block, less than two
 LOADED = ["effects.shared_slung_load.mass=1.0", "effects.shared_slung_load.length=1.0"]
 MISSION = "delivery_mission"  # random wind, ground contact, air density
@@ -46,7 +48,6 @@ def alone(k, volts, ticks, start=None):
     return pack_row(step_alone(core.method, core.vehicle, core.key, state, volts, core.step, core.steps, ticks).motion)
 
 
-@pytest.mark.long
 def test_members_are_stepped_in_vector_registers(batch):
     batch.reset()
     batch.step(motor_voltages=np.full((N, 4), 31.0))
@@ -54,12 +55,10 @@ def test_members_are_stepped_in_vector_registers(batch):
         assert re.search(r"fmul <\d+ x double>", str(compiled.library._get_module_for_linking()))
 
 
-@pytest.mark.long
 def rows(state):
     return np.column_stack(state[1:6])
 
 
-@pytest.mark.long
 def test_every_member_is_bit_for_bit_single_vehicle(batch):
     batch.reset()
     volts = np.linspace(31.0, 35.0, 4 * N).reshape(N, 4)  # some stay on the ground, some take off
@@ -70,7 +69,6 @@ def test_every_member_is_bit_for_bit_single_vehicle(batch):
         assert np.array_equal(rows(end)[k], alone(k, tuple(volts[k]), 125))
 
 
-@pytest.mark.long
 def test_batch_at_limit_of_axial_inflow_equals_single_vehicle():
     """Two of three members reach the limit, whose steps have error control."""
     batch, ticks, volts = lapwing.BatchSimulator("hexacopter_tilted", 3), 25, (4.0, 5.0, 3.0, 6.0, 4.5, 5.5)
@@ -89,7 +87,6 @@ def test_batch_at_limit_of_axial_inflow_equals_single_vehicle():
         assert np.array_equal(rows(end)[k], pack_row(one.motion))
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("effect", ["dc_motor={}", "dc_motor={inductance=5e-5}", "dynamic_inflow={}"])
 def test_limits_of_motors_and_flow_are_bit_for_bit_single_vehicle(effect):
     """Rotors of two of three members reach a limit, whose steps have error control."""
@@ -124,7 +121,6 @@ def test_members_are_reset_independently(batch):
     assert np.array_equal(rows(batch.reset()), rows(first))
 
 
-@pytest.mark.long
 def test_body_rates_are_followed_and_thrust_holds_weight():
     batch = lapwing.BatchSimulator("hover", 4)
     batch.reset(position_world=(0.0, 0.0, 50.0), rotor_speed=np.full(4, 330.0))
@@ -135,7 +131,6 @@ def test_body_rates_are_followed_and_thrust_holds_weight():
     assert abs(end.velocity_world[3, 2]) < 0.5
 
 
-@pytest.mark.long
 def test_body_rate_control_equals_voltages_computed_in_numpy():
     """The reference in numpy: torque, allocation by least squares, inverse of thrust = k speed^2, speed = u KV."""
     one, other = (lapwing.BatchSimulator("hover", 3) for _ in range(2))
@@ -221,7 +216,6 @@ def test_member_with_non_finite_number_is_marked():
             assert batch.step(motor_voltages=np.zeros((3, 4))).valid.tolist() == [True, True, False]
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("ground", ["slope", "bumps", "steps", "box and cylinder", "grid", "rotor table"])
 def test_members_over_any_terrain_are_bit_for_bit_single_vehicle(ground):
     """The members drop onto different places, some on an edge or beside it."""
@@ -257,7 +251,6 @@ def test_members_over_any_terrain_are_bit_for_bit_single_vehicle(ground):
     assert (end.position_world[:, 2] > heights).all()
 
 
-@pytest.mark.long
 def test_bumps_of_members_differ():
     vary = {"environment.terrain.bump_height": lapwing.uniform(0.01, 0.3)}
     batch = lapwing.BatchSimulator("hover", 3, vary, {"environment.terrain.bump_length": 4.0})
@@ -272,7 +265,6 @@ def test_members_share_tables_of_numbers():
         lapwing.BatchSimulator("hover", 2, vary, STAIRS)
 
 
-@pytest.mark.long
 def test_solver_is_selected_from_accuracy():
     batch = lapwing.BatchSimulator("hover", 1, overrides={"solver.accuracy": 1e-4})
     assert batch.step(motor_voltages=np.zeros((1, 4))).valid.all()

@@ -16,6 +16,8 @@ from lapwing.dynamics.multibody.five_bodies import reactions as from_chassis
 from lapwing.dynamics.multibody.five_body_stabilisation import assembled_state
 from lapwing.dynamics.multibody.mechanisms import drone_system
 
+pytestmark = pytest.mark.long
+
 GRAVITY = (0.0, 0.0, -9.81)
 
 
@@ -59,7 +61,6 @@ def rotation(q):
     return np.array(quaternion.rotation_matrix(tuple(q))).reshape(3, 3)
 
 
-@pytest.mark.long
 @pytest.mark.parametrize("driven", ["speed", "torque"])
 def test_identical_to_general_path(driven):
     rng = np.random.default_rng(31)

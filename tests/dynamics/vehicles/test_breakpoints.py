@@ -17,6 +17,8 @@ from lapwing.studies.accuracy.coordinates import error, of_state
 from lapwing.studies.accuracy.reference import dop853
 from lapwing.studies.accuracy.systems.multirotor import START, VOLTAGE, right_hand_side
 
+pytestmark = pytest.mark.long
+
 DRONE = load_airframe(Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml")
 TICK, N, END = 0.004, 4, 0.1  # [s], steps of a tick, [s]
 DAMAGE, RELEASE = 0.0413, 0.0779  # [s] between two ticks and two steps
@@ -56,7 +58,6 @@ def broken_by_reference(p):
     return y
 
 
-@pytest.mark.long
 @pytest.mark.parametrize(("integrator", "bound"), [("rk4_renormalised", 1e-10), ("rk8_renormalised", 1e-12)])
 def test_faults_between_ticks_are_exact(integrator, bound):
     p, motion = fly(BROKEN, START, integrator=integrator)

@@ -20,6 +20,8 @@ from lapwing.services.common.run_schema import SHIPPED
 from lapwing.services.scene_resolver import load
 from tests.dynamics.vehicles.rebound import rebound
 
+pytestmark = pytest.mark.long
+
 QUAD = load_airframe(SHIPPED / "vehicles/quad_x.toml")
 RK4 = get("rk4_renormalised").Method()
 KEY = stream_key(1, "drone1", "plant")
@@ -81,7 +83,6 @@ def test_load_on_fixed_hook_is_pendulum():
     assert np.diff(crossings).mean() == pytest.approx(period, rel=5e-4)
 
 
-@pytest.mark.long
 def test_with_taut_cable_energy_and_both_momenta_are_kept():
     p = vehicle(SLING)
     x = begin(p, (0.05, 0.3, 97.9), (2.0, 0.5, 0.0), omega=(0.3, -0.2, 0.5))
@@ -138,7 +139,6 @@ def test_invalid_cable_parameters_are_rejected(changes, message):
         load("slung_load", changes)
 
 
-@pytest.mark.long
 def test_autopilot_lifts_and_carries_load_at_height():
     flight = lapwing.fly("slung_load", {"run.duration": 20.0})
     assert not flight.failure

@@ -13,6 +13,8 @@ from lapwing.services.scene_resolver import from_resolved, load, parse, resolve
 from tests.cosim.memory_log import fly
 from tests.cosim.test_agreement import fly_apart
 
+pytestmark = pytest.mark.long
+
 COMMON = """
 [run]
 duration = 7.0
@@ -61,7 +63,6 @@ def recorded_flight(setup):
     return fly(setup)
 
 
-@pytest.mark.long
 def test_one_carrier_equals_slung_load_model(tmp_path):
     """`slung_load` integrates vehicle and load together, without prediction."""
     alone = '[vehicle]\nairframe = "delivery_drone"\n'
@@ -84,7 +85,6 @@ def hook_position(truth):
     return truth.position[-1] + rotate((w, x, y, z), (0.1, 0.0, -0.1))
 
 
-@pytest.mark.long
 def test_static_cables_carry_weight(recorded_flight):
     reported, left, right = (
         recorded_flight.view(name) for name in ("left/body_states", "left/ground_truth", "right/ground_truth")
@@ -111,7 +111,6 @@ def test_strictest_accuracy_keeps_load_substeps_above_round_off(tmp_path):
     assert [plant.others.load.tolerance for plant in plants if plant.others.load] == [LEAST_TOLERANCE]
 
 
-@pytest.mark.long
 def test_first_carrier_publishes_load(recorded_flight):
     assert "left/body_states" in recorded_flight.topics
     assert "right/body_states" not in recorded_flight.topics
@@ -146,7 +145,6 @@ def test_invalid_shared_load_is_rejected(tmp_path, override, message):
         resolve(two_carriers(tmp_path, override))
 
 
-@pytest.mark.long
 def test_shipped_scene_lifts_load(tmp_path):
     setup = resolve(load("carried_load", ["run.duration=14.0"]))
     log = fly(setup)

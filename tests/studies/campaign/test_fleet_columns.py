@@ -19,6 +19,8 @@ from lapwing.studies.report.plot import NotRecordedError
 from lapwing.studies.simulate import fly_each
 from tests.cosim.memory_log import fly
 
+pytestmark = pytest.mark.long
+
 SHORT = ("run.duration=2.0", 'vehicle.2.success.require=["max_tilt < 0.001"]')
 VARY = [
     "--vary",
@@ -43,7 +45,6 @@ def folder(tmp_path_factory):
     return path, output
 
 
-@pytest.mark.long
 def test_each_flight_of_fleet_has_all_vehicles():
     setup = resolve(load("fleet", ["run.duration=1.0"]))
     flights, log = fly_each(setup, TOPICS), fly(setup)
@@ -55,7 +56,6 @@ def test_each_flight_of_fleet_has_all_vehicles():
         assert set(flight.fleet) == {"left", "right", "scout"}
 
 
-@pytest.mark.long
 def test_row_has_worst_of_vehicles_and_each_of_them(folder):
     path, output = folder
     result = Results(read(path))
