@@ -9,11 +9,14 @@ import lapwing as package
 from lapwing import rerun
 
 
+def _fly(scene, folder):
+    """Return the log of one second of a scene."""
+    return package.fly(package.load_scene(scene, {"run.duration": 1.0})).save(folder / "mission.mcap")
+
+
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
-    """Return a log of one second of the delivery mission with all sensors."""
-    scene = package.load_scene("delivery_mission", {"run.duration": 1.0})
-    return package.fly(scene).save(tmp_path_factory.mktemp("view") / "mission.mcap")
+    return _fly("hover", tmp_path_factory.mktemp("view"))
 
 
 @pytest.mark.parametrize("there", [True, False])
@@ -41,8 +44,10 @@ def test_invalid_log_is_rejected_in_one_line(lapwing, log, monkeypatch, tmp_path
         assert output in err
 
 
+@pytest.mark.long
 @pytest.mark.skipif(rerun.program() is None, reason="needs Rerun (pip install rerun-sdk)")
-def test_rerun_converts_log_without_warning(log, tmp_path):
+def test_rerun_converts_log_of_all_sensors_without_warning(tmp_path):
+    log = _fly("delivery_mission", tmp_path)
     command = [rerun.program(), "mcap", "convert", str(log), "-o", str(tmp_path / "mission.rrd")]
     done = subprocess.run(command, capture_output=True, text=True, check=True)
     # Rerun derives the recording's name from the file's and prints a message if it has a dot.

@@ -60,6 +60,7 @@ def test_pitch_through_90_degrees():
     assert not lost[1] < 1e-3, lost
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("stabilisation", [PARTITION, PROJECTION])
 def test_hour_of_flight_stays_together(stabilisation):
     """In 3600 s of rotation with slow propellers the largest of 60 residuals is below 1e-10 on both levels."""

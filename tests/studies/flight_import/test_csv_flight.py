@@ -12,6 +12,8 @@ from lapwing.studies.flight_import.time_alignment import clock_drift, time_offse
 from lapwing.studies.rotation_arrays import from_ned_frd, from_vector, product, rotate, rotation_vector
 from lapwing.studies.validation.plant_rows import PlantRows
 
+pytestmark = pytest.mark.long
+
 
 @pytest.fixture(scope="module")
 def flight():
@@ -37,7 +39,6 @@ def read(path):
     return open_flight(path, "nanobench")
 
 
-@pytest.mark.long
 def test_columns_become_si_quantities(flight, path):
     result = read(path)
     assert result.position == pytest.approx(flight.position, abs=1e-8)
@@ -48,7 +49,6 @@ def test_columns_become_si_quantities(flight, path):
     assert result.valid.all()
 
 
-@pytest.mark.long
 def test_gzip_has_equal_recording(path, tmp_path):
     packed = tmp_path / "flight.csv.gz"
     packed.write_bytes(gzip.compress(path.read_bytes()))
