@@ -2,8 +2,11 @@
 
 from typing import Any
 
+from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
+
+COMPACT: dict[str, Any] = {"box": SIMPLE, "pad_edge": False, "collapse_padding": True}  # for tables of up to 80 columns
 
 
 def console(width: int | None = None) -> Console:
@@ -22,3 +25,8 @@ def table(first: str, *others: str, **options: Any) -> Table:
     for head in others:
         result.add_column(head, justify="right", no_wrap=True)
     return result
+
+
+def counted(number: int, noun: str) -> str:
+    """Return a number with its noun: "1 flight", "2 flights"."""
+    return f"{number} {noun}{'' if number == 1 else 's'}"

@@ -31,11 +31,10 @@ def test_parts_have_recorded_outputs(scene: str, tmp_path: Path) -> None:
     whole = scene_config(scene)
     setup = scene_config(scene, **{"run.duration": min(whole.duration, TICKS * whole.interval)})
     parts = [part for part in PARTS if part in setup.services or (part == VEHICLE and scene not in FIRMWARE)]
-    index, whole_run = SCENES.index(scene), None
+    index = SCENES.index(scene)
     if TICKS == DEFAULT_TICKS:
         parts = [parts[index % len(parts)]]
-    if scene not in FIRMWARE:
-        whole_run = RecordedPorts(setup)
+    whole_run = None if scene in FIRMWARE else RecordedPorts(setup)
     for number, part in enumerate(parts, index // len(PARTS)):
         ports = whole_run or DrivenService(setup, part)
         assert ports.ticks > min(setup.last_tick, TICKS // 2)

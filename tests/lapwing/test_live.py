@@ -139,7 +139,7 @@ def test_latest_scan_of_lidar_is_shown_live():
 
 
 @pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
-def test_browser_follows_running_flight(tmp_path):
+def test_browser_follows_running_flight():
     run = Run()
     with LivePage(run.setup) as page:
         follow = LiveFeed(run.setup, [page.show])

@@ -11,7 +11,7 @@ from lapwing import rerun
 
 def _fly(scene, folder):
     """Return the log of one second of a scene."""
-    return package.fly(package.load_scene(scene, {"run.duration": 1.0})).save(folder / "mission.mcap")
+    return package.fly(package.load_scene(scene, {"run.duration": 1.0})).save(folder / f"{scene}.mcap")
 
 
 @pytest.fixture(scope="module")

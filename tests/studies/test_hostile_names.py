@@ -130,7 +130,7 @@ def test_paper_shows_formulas_as_text(tmp_path):
 
 @pytest.mark.long
 @pytest.mark.skipif(headless.PROGRAM is None, reason="needs Chromium")
-def test_browser_runs_no_name(written, tmp_path):
+def test_browser_runs_no_name(written):
     with headless.Browser("data:text/html,empty", (1000, 900)) as browser:
         for path in written:
             browser.call("Page.navigate", url=path.resolve().as_uri())

@@ -10,15 +10,17 @@ from types import FunctionType
 from typing import Any, TypeVar
 
 from numba.core import config
+from numba.core.registry import CPUDispatcher
 
-from lapwing.kernels.compiler import numba_versions
+from lapwing.kernels.compiler.cache import KernelCache
+from lapwing.kernels.compiler.numba_versions import PlainCache, PlainDispatcher, is_supported
 
-if numba_versions.is_supported():
-    from lapwing.kernels.compiler.pipeline import KernelDispatcher as _Dispatcher
-    from lapwing.kernels.compiler.pipeline import PipelineCache as _Cache
-else:
-    from lapwing.kernels.compiler.numba_versions import PlainCache as _Cache  # type: ignore[assignment]
-    from lapwing.kernels.compiler.numba_versions import PlainDispatcher as _Dispatcher  # type: ignore[assignment]
+_Dispatcher: type[CPUDispatcher] = PlainDispatcher
+_Cache: type[KernelCache] = PlainCache
+if is_supported():  # only then can the pipeline be imported
+    from lapwing.kernels.compiler.pipeline import KernelDispatcher, PipelineCache
+
+    _Dispatcher, _Cache = KernelDispatcher, PipelineCache
 
 F = TypeVar("F", bound=Callable[..., Any])
 

@@ -4,14 +4,13 @@ import math
 from pathlib import Path
 
 from matplotlib.figure import Figure
-from rich.box import SIMPLE
 from rich.console import Console
 
 from lapwing.studies import json_file
 from lapwing.studies.effects.procedure import Influence, Row, Study
 from lapwing.studies.report.matplotlib_figure import plot_style
 from lapwing.studies.report.style import BOUND, DPI, FLOWN, WIDTH
-from lapwing.studies.terminal import table
+from lapwing.studies.terminal import COMPACT, table
 
 MIN_BAR = 1e-6  # [m] length of the shortest bars
 
@@ -40,7 +39,7 @@ def _table(console: Console, title: str, study: Study, active: bool) -> None:
         return
     console.print(title)
     heads = ("effect", "hover\n[ns]", "share", "ground\n[ns]", "path\n[m]", "end\n[m]", "energy")
-    rows = table(*heads, box=SIMPLE, pad_edge=False, collapse_padding=True)  # 80 columns hold all digits
+    rows = table(*heads, **COMPACT)
     for row in _sorted_rows(study, active):
         if row.influence is None:
             continue
@@ -58,9 +57,9 @@ def _table(console: Console, title: str, study: Study, active: bool) -> None:
 
 
 def _cost(difference: float, noise: float) -> str:
-    if abs(difference) >= 999.5:
-        return f"{difference:.0f}"
-    return f"{difference:.3g}" if abs(difference) > noise else f"< {noise:.2g}"
+    if abs(difference) <= noise:
+        return f"< {noise:.2g}"
+    return f"{difference:.3g}" if abs(difference) < 999.5 else f"{difference:.0f}"  # without exponent
 
 
 def _changes(i: Influence) -> tuple[str, str, str]:

@@ -7,7 +7,7 @@ from rich.console import Console
 
 from lapwing.studies import json_file
 from lapwing.studies.identification.procedure import Identification
-from lapwing.studies.terminal import table
+from lapwing.studies.terminal import counted, table
 from lapwing.studies.validation.console_output import UNITS
 from lapwing.studies.validation.prediction_metrics import FIELDS
 
@@ -17,8 +17,7 @@ CORRELATED = 0.8  # correlation of two estimates above which it is printed
 def show(console: Console, identification: Identification) -> None:
     """Print estimates, correlations, undetermined parameters, and the errors on held-out flights."""
     fit = identification.fit
-    n = len(identification.used)
-    title = f"{identification.scene}: output error on {n} flight{'s' if n > 1 else ''}"
+    title = f"{identification.scene}: output error on {counted(len(identification.used), 'flight')}"
     rows = table("parameter", "before", "estimate", "standard error", title=title)
     for key, before, value, error in zip(fit.keys, fit.start, fit.values, fit.standard_errors, strict=True):
         rows.add_row(key, f"{before:.5g}", f"{value:.5g}", f"{error:.2g}")
@@ -31,7 +30,8 @@ def show(console: Console, identification: Identification) -> None:
             console.print(text, soft_wrap=True)
     for key in fit.undetermined:
         console.print(f"not determined by these flights: {key}", soft_wrap=True)
-    test_flights = f"{len(identification.held_out)} held-out flights" if identification.held_out else "the same flights"
+    held_out = len(identification.held_out)
+    test_flights = counted(held_out, "held-out flight") if held_out else "the same flights"
     console.print(f"error after 0.5 s on {test_flights}, before and after:")
     for name, before, after in zip(FIELDS, identification.before, identification.after, strict=True):
         if np.isfinite(before):  # measured by a held-out flight

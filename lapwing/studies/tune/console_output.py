@@ -3,11 +3,10 @@
 import math
 from collections.abc import Iterator
 
-from rich.box import SIMPLE
 from rich.console import Console
 
 from lapwing.services.autopilot.margins import Margins
-from lapwing.studies.terminal import table
+from lapwing.studies.terminal import COMPACT, table
 from lapwing.studies.tracking import AXES, unit_and_factor
 from lapwing.studies.tune.corners import failure
 from lapwing.studies.tune.gain_refinement import rmse
@@ -66,7 +65,7 @@ def tables(tuning: Tuning) -> Iterator[Rows]:
 def show(console: Console, tuning: Tuning) -> None:
     """Print the tables, failures in red."""
     for rows in tables(tuning):
-        shown = table(*rows.heads, title=rows.title, box=SIMPLE, pad_edge=False, collapse_padding=True)
+        shown = table(*rows.heads, title=rows.title, **COMPACT)
         for k, row in enumerate(rows.rows):
             shown.add_row(*row, style="bold red" if k in rows.failed else None)
         console.print(shown)

@@ -2,10 +2,10 @@
 
 import math
 
-from rich.box import SIMPLE
 from rich.console import Console
 from rich.table import Table
 
+from lapwing.studies.terminal import COMPACT, counted
 from lapwing.studies.validation.closed_loop import ClosedLoop
 from lapwing.studies.validation.prediction_metrics import FIELDS
 from lapwing.studies.validation.procedure import Validation
@@ -15,11 +15,10 @@ UNITS = dict(zip(FIELDS, ("m", "m/s", "rad", "rad/s", "m/s^2", "W"), strict=True
 
 def show(console: Console, validation: Validation) -> None:
     """Print the errors, those of the baselines, warnings, and the skipped flights."""
-    n = len(validation.flights)
-    extent = f"{validation.windows} windows, {n} flight{'s' if n > 1 else ''}"
+    extent = f"{validation.windows} windows, {counted(len(validation.flights), 'flight')}"
     heads, rows = error_table(validation)
     console.print(f"{validation.scene}: mean absolute prediction error, {extent}", soft_wrap=True)
-    table = Table(box=SIMPLE, pad_edge=False, collapse_padding=True)  # fits in 80 columns
+    table = Table(**COMPACT)
     for k, head in enumerate(heads):
         table.add_column(
             head.replace(" ", "\n") if k > 1 else head, justify="left" if k == 1 else "right", no_wrap=True

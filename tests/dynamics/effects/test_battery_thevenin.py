@@ -122,7 +122,7 @@ def test_exponent_follows_peukerts_law(drone, situation, rotors, exponent):
 
 
 def test_branches_without_exponent_are_near_peukerts_law(drone, situation, rotors):
-    """Reference: n = 1.05, usual for lithium polymer. the theory lists the differences; 20 C is cut off early."""
+    """Reference: n = 1.05, usual for lithium polymer. The theory lists the differences; 20 C is cut off early."""
     base = delivered(drone, situation, rotors, 1.0)
     differences = [delivered(drone, situation, rotors, r) / (base * r**-0.05) - 1.0 for r in (2.0, 5.0, 10.0, 20.0)]
     assert differences == pytest.approx([0.033, 0.074, 0.093, -0.215], abs=0.01)

@@ -82,7 +82,7 @@ def test_browser_follows_vehicle_and_seeks(tmp_path, page):
 
 @pytest.mark.long
 @pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
-def test_browser_links_view_to_plots(tmp_path, page):
+def test_browser_links_view_to_plots(page):
     with chromium.Browser(page) as browser:
         played, sought, cursor = browser.run(
             """
@@ -118,7 +118,7 @@ def test_browser_links_view_to_plots(tmp_path, page):
 
 @pytest.mark.long
 @pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
-def test_view_opens_at_event_that_was_chosen_before(tmp_path, page):
+def test_view_opens_at_event_that_was_chosen_before(page):
     with chromium.Browser(page) as browser:
         time = browser.run(
             """
