@@ -27,7 +27,7 @@ from lapwing.services.common.run_schema import Run
 from lapwing.services.common.vehicle_schema import Vehicle, gravity
 from lapwing.services.plant import models
 from lapwing.studies.accuracy.coordinates import coordinates, defect
-from lapwing.studies.accuracy.double_double import DoubleDouble
+from lapwing.studies.accuracy.extended_numbers import Number
 from lapwing.studies.accuracy.integrate import SAMPLES
 from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
 from lapwing.studies.accuracy.round_off import coordinates_in_extended_precision, extend, in_extended_precision
@@ -172,7 +172,7 @@ def problem(scene: Scene, manoeuvre: Voltages = gentle_voltages) -> Problem:
 
         def final_state_in_extended_precision(step: float) -> np.ndarray:
             count = round(exchange.interval / step)
-            fly, h = extend(advance), DoubleDouble(exchange.interval / count)
+            fly, h = extend(advance), Number(exchange.interval / count)
             x, numbers = in_extended_precision(state), in_extended_precision(p)
             for tick, voltage in enumerate(map(tuple, voltages.tolist()), TICK):
                 x = fly(method.Method(), numbers, key, tick, x, in_extended_precision(voltage), h, count)

@@ -1,8 +1,7 @@
 """Round-off error: comparison of equal steps in double and in extended precision.
 
 Both runs execute the source of the same kernels with the same step and the same coefficients, so that their difference
-is the rounding of doubles alone. Extended numbers are double-doubles, with 32 digits. Random numbers are doubles in
-both runs.
+is the rounding of doubles alone. Random numbers are doubles in both runs.
 """
 
 from collections.abc import Callable
@@ -17,8 +16,7 @@ from lapwing.dynamics.integrators import RATES
 from lapwing.kernels import math
 from lapwing.kernels.codegen import GENERATORS
 from lapwing.studies.accuracy.coordinates import coordinates, error
-from lapwing.studies.accuracy.double_double import DoubleDouble
-from lapwing.studies.accuracy.double_double_math import FUNCTIONS
+from lapwing.studies.accuracy.extended_numbers import FUNCTIONS, Number
 from lapwing.studies.accuracy.problem import Problem
 
 STEPS = 400  # at least
@@ -63,7 +61,7 @@ def end_in_extended_precision(method: ModuleType, p: Any, x: Any, h: float, step
     step, rate = extend(method.step), extend(RATES[type(p)])
     state, p = in_extended_precision(x), in_extended_precision(p)
     for n in range(steps):
-        state = step(rate, p, DoubleDouble(n * h), state, DoubleDouble(h))
+        state = step(rate, p, Number(n * h), state, Number(h))
     return coordinates_in_extended_precision(x, state)
 
 
@@ -78,14 +76,14 @@ def coordinates_in_extended_precision(x: Any, state: Any) -> np.ndarray:
         TypeError: part of the state is a double.
     """
     numbers = _numbers(state)
-    if not all(isinstance(number, DoubleDouble) for number in numbers):
+    if not all(isinstance(number, Number) for number in numbers):
         raise TypeError(f"{type(x).__name__}: a step returns doubles for extended numbers")
     return coordinates(x, np.array([numbers], object))[0]
 
 
 def in_extended_precision(tree: Any) -> Any:
     """Return a tree with its doubles as extended numbers."""
-    return _map_leaves(float, DoubleDouble, tree)
+    return _map_leaves(float, Number, tree)
 
 
 def extend(function: Any) -> Callable[..., Any]:
@@ -106,7 +104,7 @@ def _extend(function: Any, known: dict[int, Any]) -> Any:
     if id(python) in known:
         return known[id(python)]
     if python.__module__ == noise.__name__:
-        return lambda *values: in_extended_precision(function(*_map_leaves(DoubleDouble, float, values)))
+        return lambda *values: in_extended_precision(function(*_map_leaves(Number, float, values)))
     if generate is not None:
         result: Any = _extend_generator(generate, known)
         known[id(python)] = result
@@ -147,7 +145,7 @@ def _extend_generator(generate: Callable[..., Any], known: dict[int, Any]) -> Ca
         key = tuple(map(_shape, values))
         if key not in variants:
             variants[key] = _extend(
-                generate(*(numba.typeof(_map_leaves(DoubleDouble, float, value)) for value in values)), known
+                generate(*(numba.typeof(_map_leaves(Number, float, value)) for value in values)), known
             )
         return variants[key](*values)
 

@@ -12,7 +12,7 @@ from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 from lapwing.kernels import always_inline, math
 from lapwing.studies.accuracy import plant, round_off
-from lapwing.studies.accuracy.double_double import DoubleDouble
+from lapwing.studies.accuracy.extended_numbers import Number
 from lapwing.studies.accuracy.integrate import fixed_step_methods
 from lapwing.studies.accuracy.problem import Problem
 from lapwing.studies.accuracy.round_off import end_in_extended_precision, extend, in_extended_precision
@@ -36,10 +36,6 @@ RATES[LinearOscillator] = oscillator_rate
 P, START = LinearOscillator(7.3, 0.11), (0.7, -0.3)
 
 
-def in_digits(x: DoubleDouble) -> mpmath.mpf:
-    return mpmath.mpf(x.high) + mpmath.mpf(x.low)
-
-
 def end_in_digits(steps: int, h: float) -> list[mpmath.mpf]:
     """Return the final state of RK4 with a round-off error below 1e-45."""
     with mpmath.workdps(50):
@@ -54,7 +50,7 @@ def test_end_of_linear_system_has_digits_of_extended_precision() -> None:
     end = end_in_extended_precision(rk4, P, START, h, STEPS)
     for value, digits in zip(end, exact, strict=True):
         with mpmath.workdps(50):
-            assert abs(in_digits(value) - digits) < 1e-28
+            assert abs(mpmath.mpf(value) - digits) < 1e-28
 
 
 def test_round_off_of_linear_system_equals_error_in_digits() -> None:
@@ -78,11 +74,11 @@ def elementary(x):
 
 
 def test_elementary_functions_have_extended_precision() -> None:
-    value = extend(elementary)(DoubleDouble(0.3))
+    value = extend(elementary)(Number(0.3))
     with mpmath.workdps(50):
         x = mpmath.mpf(0.3)
         exact = mpmath.sin(x) * mpmath.exp(x) + mpmath.sqrt(mpmath.cos(x)) + mpmath.hypot(x, 2) + mpmath.atan2(x, 3)
-        assert abs(in_digits(value) - exact) < 1e-30
+        assert abs(mpmath.mpf(value) - exact) < 1e-30
 
 
 @pytest.mark.long
@@ -121,12 +117,12 @@ def test_multirotor_of_scene_has_digits_of_extended_precision() -> None:
     fly, method = extend(multirotor.advance), integrators.get(round_off.METHOD).Method()
     numbers, command = in_extended_precision(p), in_extended_precision((volts,) * 4)
     for tick in range(steps):
-        state = fly(method, numbers, (0, 0), tick, state, command, DoubleDouble(h), 1)
+        state = fly(method, numbers, (0, 0), tick, state, command, Number(h), 1)
     motion = state.motion
     values = motion.position_world[2], motion.velocity_world[2], motion.rotor_speed[3]
     for value, digits in zip(values, climb_in_digits(p, volts, 20.0, speed, h, steps), strict=True):
         with mpmath.workdps(50):
-            assert abs(in_digits(value) - digits) < 1e-29 * (1 + abs(digits))  # a double has 1.1e-16
+            assert abs(mpmath.mpf(value) - digits) < 1e-29 * (1 + abs(digits))  # a double has 1.1e-16
 
 
 @pytest.mark.long
