@@ -6,6 +6,7 @@ A benchmark is a module of this folder with a `main()` that returns its rows of 
 """
 
 import argparse
+import inspect
 import sys
 import traceback
 
@@ -23,6 +24,9 @@ if unknown := set(options.names) - modules_by_name.keys():
 rows, failed = [], []
 for name, module in modules_by_name.items():
     if (options.names and name not in options.names) or (options.quick and getattr(module, "SLOW", False)):
+        continue
+    if any(parameter.default is parameter.empty for parameter in inspect.signature(module.main).parameters.values()):
+        print(f"== {name}: skipped, it needs files of recorded flights (python -m benchmarks.{name} --help)")
         continue
     print(f"== {name}", flush=True)
     try:

@@ -1,23 +1,26 @@
 """Plant steps per second of a SIMD batch on all cores, compared with one vehicle after another.
 
-    python -m benchmarks.batch [SCENE...]
+    python -m benchmarks.batch [SCENES...]
 
 Solver and communication steps of the scene; the best of several runs, which other work disturbs least.
 """
 
-import sys
 import time
+from typing import Annotated
 
 import llvmlite.binding as llvm
 import numpy as np
+import typer
 
 import lapwing
+from benchmarks._command import command_line
 from benchmarks._targets import Row, show
 from lapwing.dynamics import simd_batch as kernels
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.kernels import kernel
 from lapwing.services.scene_resolver import load, resolve
 
+SCENES = ["hover", "delivery_mission"]
 N, TICKS, REPETITIONS = 2048, 10, 300  # runs of a millisecond, so that most are not interrupted
 
 
@@ -56,10 +59,10 @@ def rates(scene: str) -> tuple[float, float, float]:
     return N * steps / together, N * steps / single, 40 * steps / alone
 
 
-def main(*scenes: str) -> list[Row]:
+def main(scenes: Annotated[list[str], typer.Argument()] = SCENES) -> list[Row]:
     bar = 200.0 if "avx512f" in llvm.get_host_cpu_features() else 100.0
     result = []
-    for scene in scenes or ("hover", "delivery_mission"):
+    for scene in scenes:
         together, single, alone = rates(scene)
         print(f"{scene}: one core {single:.1f}, one vehicle after the other {alone:.1f} million steps/s")
         result.append(Row(f"batch, all cores, {scene}, million steps/s", together, "", bar, True))
@@ -67,4 +70,4 @@ def main(*scenes: str) -> list[Row]:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    command_line(main)

@@ -20,6 +20,7 @@ from statistics import median
 import numpy as np
 
 import lapwing
+from benchmarks._command import command_line
 from benchmarks._targets import Row, show
 
 N, STEPS, REPEATS, ROUNDS, FINER = 512, 100, 5, 1, 8
@@ -111,7 +112,7 @@ class Crazyflow:
 CONTESTANTS = {"lapwing": Lapwing, "mujoco": MuJoCo, "crazyflow": Crazyflow}  # by required package
 
 
-def main():
+def main() -> list[Row]:
     installed = [name for name in CONTESTANTS if find_spec(name)]
     for name in CONTESTANTS.keys() - set(installed):
         print(f"{name} is not installed: pip install 'lapwing[bench]'")
@@ -129,7 +130,8 @@ def main():
 def measure_in_process(name):
     """Return (steps per second of processor time, error) of a simulator in a separate process."""
     environment = {**os.environ, "SCIPY_ARRAY_API": "1"}  # Crazyflow needs it before SciPy is imported
-    command = [sys.executable, "-W", "ignore", "-m", "benchmarks.batch_others", name]
+    code = f"from benchmarks import batch_others as b; print(b.json.dumps(b.measure(b.CONTESTANTS[{name!r}])))"
+    command = [sys.executable, "-W", "ignore", "-c", code]
     done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, check=True)
     return json.loads(done.stdout.splitlines()[-1])
 
@@ -156,4 +158,4 @@ def error(contestant):
 
 
 if __name__ == "__main__":
-    print(json.dumps(measure(CONTESTANTS[sys.argv[1]]))) if sys.argv[1:] else main()
+    command_line(main)

@@ -2,15 +2,15 @@
 
 The overhead is resolving the scene, creating and reading the block diagram, and computing metrics; each is printed.
 
-python -m benchmarks.campaign [RUNS]
+    python -m benchmarks.campaign [--runs N]
 """
 
-import sys
 import time
 from contextlib import ExitStack, contextmanager
 from statistics import median
 
 import lapwing.studies.simulate
+from benchmarks._command import command_line
 from benchmarks._targets import Row, show
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.studies.campaign import runs as campaign_runs
@@ -33,7 +33,7 @@ PARTS = {
 """Parts of a run: name and functions."""
 
 
-def main(runs=20):
+def main(runs: int = 20) -> list[Row]:
     seconds, overhead, simulated = measure(plan(SCENE, runs=runs))
     _, varied_overhead, _ = measure(plan(SCENE, runs=runs, vary=VARIED))
     result = [
@@ -78,4 +78,4 @@ def timed(of, name):
 
 
 if __name__ == "__main__":
-    main(*[int(a) for a in sys.argv[1:]])
+    command_line(main)

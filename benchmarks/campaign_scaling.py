@@ -1,22 +1,22 @@
 """Processor time per run and peak memory of campaigns of increasing size, including the report.
 
-    python -m benchmarks.campaign_scaling [MOST]
+    python -m benchmarks.campaign_scaling [--most RUNS]
 
 Two seconds of hover on one worker, 100, 1000, 10000 ... runs up to MOST, each campaign in a separate process.
 """
 
 import os
 import subprocess
-import sys
 import tempfile
 from itertools import pairwise
 
+from benchmarks._command import command_line
 from benchmarks._targets import LAPWING, Row, show
 
 CAMPAIGN = [*LAPWING, "campaign", "hover", "--set", "run.duration=2", "--workers", "1"]
 
 
-def main(most=10000):
+def main(most: int = 10000) -> list[Row]:
     counts, cost = [10**k for k in range(2, 9) if 10**k <= most], {}
     with tempfile.TemporaryDirectory() as folder:
         measure_command([*CAMPAIGN, "--runs", "1", "--out", f"{folder}/warm"])
@@ -43,4 +43,4 @@ def measure_command(command):
 
 
 if __name__ == "__main__":
-    main(*[int(a) for a in sys.argv[1:]])
+    command_line(main)

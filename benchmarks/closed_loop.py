@@ -22,6 +22,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from benchmarks._command import command_line
 from benchmarks._jsbsim import CONTROL, JsbsimQuad
 from benchmarks._targets import Row, show
 from lapwing.services.scene_resolver import load
@@ -127,4 +128,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    command_line(main)

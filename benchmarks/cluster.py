@@ -1,14 +1,14 @@
 """Cost of a shard for a Dask scheduler and the waiting command: the number of workers that one can serve.
 
-    python -m benchmarks.cluster [SHARDS]
+    python -m benchmarks.cluster [--shards N]
 
 Shards of 250 runs with immediate results, on one worker; scheduler and command run in this process. It needs
 `pip install lapwing[cluster]`.
 """
 
-import sys
 import time
 
+from benchmarks._command import command_line
 from lapwing.studies.campaign.cluster import dask
 from lapwing.studies.campaign.folder import MAX_SHARD_SIZE as RUNS
 from lapwing.studies.metrics import METRICS
@@ -20,7 +20,7 @@ def rows(shard):
     return [{"run": RUNS * shard + k, "seed": k + 1, **numbers} for k in range(RUNS)]
 
 
-def main(shards=2000):
+def main(shards: int = 2000) -> None:
     from distributed import LocalCluster
 
     with LocalCluster(n_workers=1, threads_per_worker=1, dashboard_address=None) as cluster:
@@ -29,8 +29,7 @@ def main(shards=2000):
             pass
         each = (time.process_time() - began) / shards
     print(f"{1e3 * each:.2f} ms of processor time for a shard: {1 / each:.0f} shards, {RUNS / each:.0f} runs a second")
-    return []
 
 
 if __name__ == "__main__":
-    main(*[int(a) for a in sys.argv[1:]])
+    command_line(main)

@@ -8,6 +8,7 @@ import subprocess
 import sys
 import tempfile
 
+from benchmarks._command import command_line
 from benchmarks._targets import Row, show
 
 DRAG = {"effects.body_drag.area": [0.06, 0.06, 0.06], "effects.random_wind_force.allow_body_drag": True}
@@ -44,4 +45,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    command_line(main)

@@ -16,6 +16,7 @@ import llvmlite.binding as llvm
 import numpy as np
 from numba import njit
 
+from benchmarks._command import command_line
 from lapwing.kernels import math as functions
 from lapwing.kernels import vectorise_loops
 
@@ -126,4 +127,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    command_line(main)

@@ -8,18 +8,21 @@ in short rounds. The best round, which other work disturbed least, is compared w
 busy the machine was.
 """
 
-import sys
 import time
 from collections.abc import Callable
 from statistics import median
+from typing import Annotated
 
 import gymnasium
 import numpy as np
+import typer
 
 import lapwing
 import lapwing.gym
+from benchmarks._command import command_line
 from benchmarks._targets import Row, show
 
+VEHICLES = [64, 1024]
 TICKS, ROUNDS, SECONDS = 5, 120, 0.02  # [s] duration of a round
 SINGLE, SHARE = 20_000.0, 0.6  # targets: steps/s; ratio to the speed of a batch
 
@@ -79,10 +82,9 @@ def rates(contestants: dict[str, tuple[int, Callable[[], None]]]) -> dict[str, l
     return measured
 
 
-def main(*vehicles: int) -> list[Row]:
-    many = vehicles or (64, 1024)
+def main(vehicles: Annotated[list[int], typer.Argument()] = VEHICLES) -> list[Row]:
     contestants = {"Simulator": (1, simulator()), "BatchSimulator, 1": (1, batch(1)), "gymnasium.make": (1, single())}
-    for n in many:
+    for n in vehicles:
         contestants |= {f"BatchSimulator, {n}": (n, batch(n)), f"gymnasium.make_vec, {n}": (n, vector(n))}
     rounds = rates(contestants)
     print(f"{'steps/s':28}{'best round':>12}{'median':>12}{'ticks/s, best':>16}")
@@ -90,11 +92,11 @@ def main(*vehicles: int) -> list[Row]:
         print(f"{name:28}{max(each):12,.0f}{median(each):12,.0f}{max(each) * TICKS:16,.0f}")
     result = {name: max(each) for name, each in rounds.items()}
     rows = [Row("gymnasium.make, steps", result["gymnasium.make"], "1/s", SINGLE, True)]
-    for n in many:
+    for n in vehicles:
         share = result[f"gymnasium.make_vec, {n}"] / result[f"BatchSimulator, {n}"]
         rows.append(Row(f"gymnasium.make_vec to BatchSimulator, {n} vehicles", share, "1", SHARE, True))
     return show(rows)
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    command_line(main)

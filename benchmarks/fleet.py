@@ -1,16 +1,16 @@
 """Processor time per simulated second over the size of a fleet, in one process and in several.
 
-    python -m benchmarks.fleet [MOST]
+    python -m benchmarks.fleet [--most VEHICLES]
 
-1, 2, 4, ... MOST equal quadrotors with sensors and all messages in the log. The start-up time is removed: a short
+1, 2, 4, ... equal quadrotors with sensors and all messages in the log. The start-up time is removed: a short
 flight is subtracted from a long one.
 """
 
-import sys
 import tempfile
 import time
 from pathlib import Path
 
+from benchmarks._command import command_line
 from benchmarks._targets import LAPWING, Row, show
 from benchmarks.campaign_scaling import measure_command
 from lapwing.runs.single_process_run import fly_single
@@ -45,7 +45,7 @@ duration = 10.0
 """
 
 
-def main(most=32):
+def main(most: int = 32) -> list[Row]:
     counts = [2**k for k in range(10) if 2**k <= min(most, 50)]
     with tempfile.TemporaryDirectory() as folder:
         scenes = {n: scene(n, Path(folder, f"fleet_{n}.toml")) for n in counts}
@@ -96,4 +96,4 @@ def multi_process(path, log, duration):
 
 
 if __name__ == "__main__":
-    main(*[int(a) for a in sys.argv[1:]])
+    command_line(main)

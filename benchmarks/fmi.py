@@ -1,8 +1,10 @@
-"""Cost of exported FMUs in free fall, and of imported ones in a run: `python -m benchmarks.fmi [SCENE [RATE]]`."""
+"""Cost of exported FMUs in free fall, and of imported ones in a run.
+
+python -m benchmarks.fmi [--scene SCENE] [--rate HZ]
+"""
 
 import ctypes
 import subprocess
-import sys
 import tempfile
 import time
 from collections.abc import Callable
@@ -11,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from benchmarks._command import command_line
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.diagram.compiled_block import run
@@ -79,10 +82,10 @@ def timed_steps(folder: Path) -> Any:
     return function
 
 
-def main(scene: str, rate: str = "1000") -> None:
+def main(scene: str = "delivery_mission", rate: int = 1000) -> None:
     import fmpy
 
-    settings = [f"communication.rate={rate}", f"solver.step={1.0 / int(rate)!r}"]
+    settings = [f"communication.rate={rate}", f"solver.step={1.0 / rate!r}"]
     setup = scene_resolver.resolve(scene_resolver.load(scene, settings))
     with tempfile.TemporaryDirectory() as name:
         path = Path(name) / "plant.fmu"
@@ -171,4 +174,4 @@ def import_overhead(scene: str, settings: list[str], path: Path, own: float) -> 
 
 
 if __name__ == "__main__":
-    main(*(sys.argv[1:] or ["delivery_mission"]))
+    command_line(main)

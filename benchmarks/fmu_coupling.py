@@ -1,18 +1,21 @@
-"""Parts of a scene as FMUs that FMPy couples: `python -m benchmarks.fmu_coupling [SCENE [RATE ...]]`.
+"""Parts of a scene as FMUs that FMPy couples.
+
+    python -m benchmarks.fmu_coupling [--scene SCENE] [RATES...]
 
 Flies the scene with exported FMUs under a Gauss-Seidel and a Jacobi master, and compares them with the same couplings
 in Lapwing. Noise is removed as by `lapwing accuracy`.
 """
 
-import sys
 import tempfile
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import fmpy
 import numpy as np
+import typer
 from fmpy.fmi3 import FMU3Slave
 
+from benchmarks._command import command_line
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.fmi.fmu import export_fmu
 from lapwing.messages.topics import TRUTH
@@ -20,6 +23,7 @@ from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.accuracy.error_budget import noise_overrides, rate_overrides
 from lapwing.studies.simulate import fly
 
+RATES = [250, 500, 1000]  # [Hz]
 FINEST = 2  # factor from the highest rate
 
 
@@ -107,18 +111,17 @@ def distance(one: np.ndarray, other: np.ndarray) -> str:
     return f"{np.quantile(d, 0.9):.1e} ({d.max():.1e})" if d.max() else "same bits"
 
 
-def main(scene: str, *rates: str) -> None:
+def main(scene: str = "delivery_mission", rates: Annotated[list[int], typer.Argument()] = RATES) -> None:
     loaded = load(scene)
-    chosen = [int(rate) for rate in rates] or [250, 500, 1000]
 
     def settings(rate: int) -> list[str]:
-        step = 1.0 / (FINEST * max(chosen))  # equal for all rates
+        step = 1.0 / (FINEST * max(rates))  # equal for all rates
         return [*noise_overrides(loaded), *rate_overrides(loaded, rate), f"solver.step={step!r}"]
 
-    finest = lapwing_positions(scene, settings(FINEST * max(chosen)), "gauss_seidel")
+    finest = lapwing_positions(scene, settings(FINEST * max(rates)), "gauss_seidel")
     print("| rate | FMPy Gauss-Seidel to `lapwing run` | FMPy Jacobi to `lapwing run` with Jacobi |", end="")
     print(" Gauss-Seidel to finest | Jacobi to Gauss-Seidel |\n|---|---|---|---|---|")
-    for rate in chosen:
+    for rate in rates:
         own = lapwing_positions(scene, settings(rate), "gauss_seidel")
         parallel = lapwing_positions(scene, settings(rate), "jacobi")
         setup = resolve(load(scene, settings(rate)))
@@ -137,4 +140,4 @@ def main(scene: str, *rates: str) -> None:
 
 
 if __name__ == "__main__":
-    main(*(sys.argv[1:] or ["delivery_mission"]))
+    command_line(main)

@@ -1,9 +1,10 @@
 """Coverage of the standard errors of `lapwing identify` on simulated flights with sensor noise.
 
-`python -m benchmarks.identification_coverage [SEEDS [FIRST [linear]]]` flies SEEDS seeds from FIRST on, estimates four
-parameters from each flight, and prints how many true values lie within two standard errors. Exact standard errors give
-95 %. With `linear` the moment equations are linearised about the true values and then solved, in a twentieth of the
-time.
+    python -m benchmarks.identification_coverage [--seeds N] [--first SEED] [--linear]
+
+Flies N seeds, estimates four parameters from each flight, and prints how many true values lie within two standard
+errors. Exact standard errors give 95 %. With `--linear` the moment equations are linearised about the true values and
+then solved, in a twentieth of the time.
 """
 
 import sys
@@ -22,6 +23,8 @@ from lapwing.studies.validation.start_states import NO_TRIM
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "studies"))
 from flight_recordings import INTERVAL, simulated
+
+from benchmarks._command import command_line
 
 SCENE, SECONDS, WINDOWS = "crazyflie_21", 20.0, 200
 TOGETHER = 25  # flights per linearised problem
@@ -64,7 +67,6 @@ def solution(
 
 
 def main(seeds: int = 100, first: int = 1, linear: bool = False) -> None:
-    """Print coverage and mean error of each parameter."""
     begin = time.perf_counter()
     plant, rows = PlantRows(SCENE, INTERVAL), PlantRows(SCENE, INTERVAL)
     scene = load_one(SCENE, ())
@@ -83,4 +85,4 @@ def main(seeds: int = 100, first: int = 1, linear: bool = False) -> None:
 
 
 if __name__ == "__main__":
-    main(*(int(argument) for argument in sys.argv[1:3]), linear=sys.argv[3:] == ["linear"])
+    command_line(main)

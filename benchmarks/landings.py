@@ -1,37 +1,40 @@
-"""python -m benchmarks.landings: ratio of error to required accuracy in 200 random landings and other contacts."""
+"""Ratio of error to required accuracy in random landings, and in other contacts: at steps, on folds of a grid, ...
 
-import argparse
+    python -m benchmarks.landings [--kind KIND] [--first N] [--count N] [--json FILE]
+
+Prints a table of docs/explanation/accuracy.md.
+"""
+
 from collections.abc import Collection
+from enum import StrEnum
 from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+from typer import Option
 
+from benchmarks._command import command_line
 from lapwing.studies.accuracy.landings.cases import ACCURACIES, DRAWS
 from lapwing.studies.accuracy.landings.measure import LandingErrors, measure, ratios, read, write
 
+Kind = StrEnum("Kind", {name: name for name in DRAWS})
 
-def main() -> None:
-    """Print the table of docs/explanation/accuracy.md."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.landings")
-    parser.add_argument(
-        "--kind",
-        choices=list(DRAWS),
-        default="random",
-        help="random landings, at steps, on folds of a grid, toppling, or with propeller strikes [default: random]",
-    )
-    parser.add_argument("--first", type=int, default=0, help="number of the first landing [default: 0]")
-    parser.add_argument("--count", type=int, default=200, help="number of landings [default: 200]")
-    parser.add_argument("--processes", type=int, help="landings flown at once [default: number of processors]")
-    parser.add_argument(
-        "--json", type=Path, metavar="FILE", help="add the results to FILE; landings that it holds are not flown again"
-    )
-    options = parser.parse_args()
-    landings = read(options.json) if options.json else {}
-    seeds = [k for k in range(options.first, options.first + options.count) if k not in landings]
-    for landing in measure(seeds, options.processes, options.kind):
+
+def main(
+    kind: Annotated[Kind, Option(help="random or special landings")] = Kind("random"),  # noqa: B008
+    first: Annotated[int, Option(help="number of the first landing")] = 0,
+    count: Annotated[int, Option(help="number of landings")] = 200,
+    processes: Annotated[int | None, Option(help="landings flown at once; default: number of processors")] = None,
+    results: Annotated[
+        Path | None, Option("--json", help="add the results to this file; landings that it holds are not flown again")
+    ] = None,
+) -> None:
+    landings = read(results) if results else {}
+    seeds = [k for k in range(first, first + count) if k not in landings]
+    for landing in measure(seeds, processes, kind):
         landings[landing.seed] = landing
-        if options.json:
-            write(options.json, landings.values())
+        if results:
+            write(results, landings.values())
     show(sorted(landings.values()))
 
 
@@ -56,4 +59,4 @@ def show(landings: Collection[LandingErrors]) -> None:
 
 
 if __name__ == "__main__":
-    main()
+    command_line(main)

@@ -1,14 +1,13 @@
 """Learning to hover: the agent of examples/ppo_hover.py in lapwing.gym and in gym-pybullet-drones' HoverAviary.
 
-    python -m benchmarks.learning [STEPS]
+    python -m benchmarks.learning [--steps N]
 
-STEPS is the number of environment steps of all vehicles together, equal for both; each simulator runs in a separate
+N is the number of environment steps of all vehicles together, equal for both; each simulator runs in a separate
 process. gym-pybullet-drones has one vehicle per environment: Gymnasium's SyncVectorEnv steps them one after another. It
 is skipped if it is not installed (`pip install git+https://github.com/utiasDSL/gym-pybullet-drones`).
 """
 
 import multiprocessing
-import sys
 import time
 from collections.abc import Callable
 from concurrent.futures import ProcessPoolExecutor
@@ -17,6 +16,8 @@ from importlib.util import find_spec
 from typing import Any, NamedTuple
 
 import numpy as np
+
+from benchmarks._command import command_line
 
 STEPS, ALONE, WARM = 3000 * 256, 200, 20  # actions of each vehicle without an agent: ALONE after WARM
 SLOW = True
@@ -63,7 +64,7 @@ CONTESTANTS = {  # by required package
 }  # all episodes of the second start equally
 
 
-def main(steps=STEPS):
+def main(steps: int = STEPS) -> None:
     if not find_spec("skrl"):
         print("skrl is not installed: pip install 'lapwing[learn]'")
         return
@@ -123,4 +124,4 @@ def timed(work):
 
 
 if __name__ == "__main__":
-    main(*map(int, sys.argv[1:]))
+    command_line(main)

@@ -1,6 +1,6 @@
 """Lock step of four processes against the bare three-hop Zenoh ping, interleaved in one run.
 
-    python -m benchmarks.lockstep [CYCLES] [REPEATS]
+    python -m benchmarks.lockstep [--cycles N] [--repeats N]
 
 Ping: three processes pass 200 bytes in a circle over the same Zenoh configuration. Lock step: plant, sensors, autopilot
 and trajectory with step packets of real size and log packets of the plant, but without physics and recorder, so that
@@ -15,6 +15,7 @@ import time
 from itertools import pairwise
 from statistics import median
 
+from benchmarks._command import command_line
 from benchmarks._targets import Row, percentile, show
 from lapwing.cosim.access.private_sockets import private_endpoints
 from lapwing.cosim.access.publisher_ids import PublisherIds
@@ -119,11 +120,9 @@ KINDS = {"ping": (ping_process, ["a", "b", "c"]), "lockstep": (lockstep_process,
 def measure(kind, cycles, core):
     """Return the duration [s] of each cycle."""
     with private_endpoints(KINDS[kind][1]) as peers:
-        more = [json.dumps(peers), str(cycles), json.dumps(core)]
+        begin, end = f"from benchmarks.lockstep import KINDS; KINDS[{kind!r}][0](", f", {peers!r}, {cycles}, {core})"
         children = [
-            subprocess.Popen(
-                [sys.executable, "-m", "benchmarks.lockstep", kind, name, *more], stdout=subprocess.PIPE, text=True
-            )
+            subprocess.Popen([sys.executable, "-c", f"{begin}{name!r}{end}"], stdout=subprocess.PIPE, text=True)
             for name in peers
         ]
         output = "".join(child.communicate(timeout=120)[0] for child in children)
@@ -148,7 +147,7 @@ def compare(cycles, repeats, core):
     return result
 
 
-def main(cycles=5000, repeats=5):
+def main(cycles: int = 5000, repeats: int = 5) -> list[Row]:
     result = []
     for placing, core in (("one core", 0), ("free", None)):
         figures = compare(cycles, repeats, core)
@@ -163,7 +162,4 @@ def main(cycles=5000, repeats=5):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) > 3:
-        KINDS[sys.argv[1]][0](sys.argv[2], json.loads(sys.argv[3]), int(sys.argv[4]), json.loads(sys.argv[5]))
-    else:
-        main(*[int(a) for a in sys.argv[1:]])
+    command_line(main)

@@ -1,6 +1,6 @@
 """Messages per second that the recorder writes without loss, on a fast disk and on a slow one.
 
-    python -m benchmarks.log [SECONDS]
+    python -m benchmarks.log [--seconds S]
 
 A process publishes log packets on the bus at a rate of messages per second of wall time; the recorder runs in a
 separate process. The messages in the log are counted.
@@ -16,6 +16,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
+from benchmarks._command import command_line
 from lapwing.cosim.access.private_sockets import private_endpoints
 from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.config.run_config import RunConfig
@@ -113,9 +114,9 @@ def record(options, endpoints, log, disk):
 def measure(rate, disk, seconds, folder):
     log = Path(folder, "log.mcap")
     with private_endpoints([SOURCE, RECORDER]) as endpoints:
-        words = [rate, disk, seconds, log, *endpoints.values()]
-        command = [sys.executable, "-m", "benchmarks.log", "--record", *map(str, words)]
-        with subprocess.Popen(command, stdout=subprocess.PIPE, text=True) as child:
+        arguments = f"setup({rate}, {seconds}), {endpoints!r}, {str(log)!r}, {disk}"
+        code = f"from benchmarks.log import record, setup; record({arguments})"
+        with subprocess.Popen([sys.executable, "-c", code], stdout=subprocess.PIPE, text=True) as child:
             sent, elapsed = publish(setup(rate, seconds), endpoints, seconds)
             memory = float(child.communicate()[0])
     with LogReader(log) as read:
@@ -131,16 +132,11 @@ def measure(rate, disk, seconds, folder):
     )
 
 
-def main(seconds=10.0):
+def main(seconds: float = 10.0) -> None:
     with tempfile.TemporaryDirectory() as folder:
         for rate, disk in ROWS:
             measure(rate, disk, seconds, folder)
 
 
 if __name__ == "__main__":
-    if sys.argv[1:2] == ["--record"]:
-        rate, disk, seconds, log, *endpoints = sys.argv[2:]
-        table = dict(zip([SOURCE, RECORDER], endpoints, strict=True))
-        record(setup(int(rate), float(seconds)), table, log, int(disk))
-    else:
-        main(*map(float, sys.argv[1:]))
+    command_line(main)

@@ -1,14 +1,14 @@
 """Peak memory of a run over its length, including metrics and report.
 
-    python -m benchmarks.long_run [MOST]
+    python -m benchmarks.long_run [--most SECONDS]
 
 The delivery mission, which hovers to the end of the run, in one process; 75, 150, 300 ... s up to MOST. Each run has a
 separate process.
 """
 
-import sys
 import tempfile
 
+from benchmarks._command import command_line
 from benchmarks._targets import LAPWING
 from benchmarks.campaign_scaling import measure_command
 
@@ -16,7 +16,7 @@ SLOW = True
 HOVERS = ["--set", "trajectory.phase.2.duration=1e6"]
 
 
-def main(most=600):
+def main(most: int = 600) -> None:
     with tempfile.TemporaryDirectory() as folder:
         seconds = 75
         while seconds <= most:
@@ -29,4 +29,4 @@ def main(most=600):
 
 
 if __name__ == "__main__":
-    main(*[int(a) for a in sys.argv[1:]])
+    command_line(main)

@@ -1,6 +1,6 @@
 """Real-time factor of the delivery mission in several processes and in one.
 
-    python -m benchmarks.mission [REPEATS]
+    python -m benchmarks.mission [--repeats N]
 
 The log is written in both modes. Kernels are compiled before the measurement.
 """
@@ -12,6 +12,7 @@ import tempfile
 from pathlib import Path
 from statistics import median
 
+from benchmarks._command import command_line
 from benchmarks._targets import Row, show
 
 SCENE = "lapwing/scenes/delivery_mission.toml"
@@ -26,7 +27,7 @@ def fly(mode, folder):
     return json.loads(figures.read_text())
 
 
-def main(repeats=3):
+def main(repeats: int = 3) -> list[Row]:
     with tempfile.TemporaryDirectory() as folder:
         fly("single-process", folder)
         runs = {mode: [fly(mode, folder) for _ in range(repeats)] for mode in ("multi-process", "single-process")}
@@ -42,4 +43,4 @@ def main(repeats=3):
 
 
 if __name__ == "__main__":
-    main(*[int(a) for a in sys.argv[1:]])
+    command_line(main)

@@ -7,11 +7,14 @@ its own RK4. The second part flies it with its real propellers and with symmetri
 """
 
 import json
-import sys
 import time
+from pathlib import Path
+from typing import Annotated
 
 import numpy as np
+import typer
 
+from benchmarks._command import command_line
 from lapwing.dynamics.integrators import get, integrate_fixed
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.multibody import augmented, five_bodies
@@ -169,7 +172,7 @@ def free_turn(drone, x):
     return motion(drone, QUIET, x).angular_acceleration_body
 
 
-def main():
+def main(figures: Annotated[Path | None, typer.Option("--json")] = None) -> None:
     best = times()
     best_other = best.get("MuJoCo RK4 step")
     print(f"{'':36}{'us':>9}{'MuJoCo / this':>15}")
@@ -188,10 +191,9 @@ def main():
         print(
             f"{speed:22.0f}{gap[speed]['rate']:14.2e}{gap[speed]['acceleration']:18.2e}{gap[speed]['attitude_deg']:16.2e}"
         )
-    if "--json" in sys.argv:
-        with open(sys.argv[sys.argv.index("--json") + 1], "w") as file:
-            json.dump({"seconds": best, "errors": wrong, "left_out": gap}, file, indent=1)
+    if figures:
+        figures.write_text(json.dumps({"seconds": best, "errors": wrong, "left_out": gap}, indent=1))
 
 
 if __name__ == "__main__":
-    main()
+    command_line(main)

@@ -1,6 +1,6 @@
 """Size and loading time of the mission's report, first live image, video, and frames per second of the 3D view.
 
-    python -m benchmarks.pages [LOG]      (default: a log of the delivery mission)
+    python -m benchmarks.pages [--log LOG]      (default: a log of the delivery mission)
 
 In headless Chromium with software rendering, which is the slow case: a laptop has a graphics processor. Frames are
 counted without the limit of the display's rate. The work of the page for a frame is measured as processor time in a
@@ -9,13 +9,13 @@ page whose drawing calls do nothing.
 
 import copy
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks._command import command_line
 from benchmarks._targets import LAPWING, Row, show
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.executors.single_process import PAGE
@@ -170,9 +170,9 @@ def fleet(flight, count):
     return first
 
 
-def main(log=None):
+def main(log: Path | None = None) -> list[Row]:
     return show(rows(log))
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    command_line(main)

@@ -15,6 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
+from benchmarks._command import command_line
 from lapwing.dynamics import effects, noise
 from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.dynamics.effects._types import Motion
@@ -175,4 +176,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    command_line(main)

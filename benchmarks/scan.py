@@ -4,6 +4,7 @@ import time
 
 import numpy as np
 
+from benchmarks._command import command_line
 from benchmarks._targets import Row
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.dynamics.environment import STANDARD
@@ -67,4 +68,4 @@ def main():
 
 
 if __name__ == "__main__":
-    main()
+    command_line(main)

@@ -6,7 +6,6 @@ The delivery mission, which hovers in random wind until it is ended, at full spe
 process for each service, or H simulated hours in one process.
 """
 
-import argparse
 import os
 import signal
 import tempfile
@@ -16,6 +15,7 @@ from pathlib import Path
 from statistics import mean
 from typing import NamedTuple
 
+from benchmarks._command import command_line
 from benchmarks._targets import Row, show
 from lapwing.cosim.log import LogReader
 from lapwing.cosim.processes.interrupt import Interrupted
@@ -140,7 +140,6 @@ def single(hours: float, log: Path) -> list[Sample]:
 
 
 def main(minutes: float = 2.0, hours: float = 0.0) -> list[Row]:
-    """Fly in one or several processes, check the log, and print the table."""
     with tempfile.TemporaryDirectory() as folder:
         log = Path(folder, "log.mcap")
         samples = single(hours, log) if hours else processes(minutes, log)
@@ -153,8 +152,4 @@ def main(minutes: float = 2.0, hours: float = 0.0) -> list[Row]:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.soak")
-    parser.add_argument("--minutes", type=float, default=2.0, help="wall time, with a process for each service")
-    parser.add_argument("--hours", type=float, default=0.0, help="simulation time, in one process")
-    options = parser.parse_args()
-    main(options.minutes, options.hours)
+    command_line(main)

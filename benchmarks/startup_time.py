@@ -1,12 +1,12 @@
 """Run time of short commands with all kernels in the cache.
 
-python -m benchmarks.startup_time [REPEATS]
+python -m benchmarks.startup_time [--repeats N]
 """
 
-import sys
 import tempfile
 from pathlib import Path
 
+from benchmarks._command import command_line
 from benchmarks._targets import LAPWING, Row, show, wall
 
 
@@ -21,9 +21,9 @@ def rows(repeats=5):
     yield Row("lapwing scenes", wall([*LAPWING, "scenes"], repeats), "s", 0.5)
 
 
-def main(repeats=5):
+def main(repeats: int = 5) -> list[Row]:
     return show(rows(repeats))
 
 
 if __name__ == "__main__":
-    main(*[int(a) for a in sys.argv[1:]])
+    command_line(main)

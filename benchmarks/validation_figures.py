@@ -1,23 +1,25 @@
 """Figures of docs/explanation/validation.md, drawn from the JSON file of `lapwing validate`.
 
-`python -m benchmarks.validation_figures ERRORS.json FOLDER` writes `validation_errors.png`: mean absolute errors of
-plant and linear fit over those of constant velocity, at the last horizon, and errors of each flight.
+    python -m benchmarks.validation_figures ERRORS FOLDER
+
+Writes `validation_errors.png`: mean absolute errors of plant and linear fit over those of constant velocity, at the
+last horizon, and errors of each flight.
 """
 
 import json
-import sys
 from pathlib import Path
 
 import matplotlib.pyplot as plt
 import numpy as np
 
+from benchmarks._command import command_line
+
 FIELDS = ("position", "velocity", "attitude", "rate")
 COLOURS = {"plant": "#1b6ca8", "linear fit": "#c44536"}
 
 
-def main(errors: str, folder: str) -> None:
-    """Draw and write the figure."""
-    content = json.loads(Path(errors).read_text(encoding="utf-8"))
+def main(errors: Path, folder: Path) -> None:
+    content = json.loads(errors.read_text(encoding="utf-8"))
     last = content["horizons"][-1]
     baseline = last["baselines"]["constant_velocity"]
     shares = {
@@ -48,8 +50,8 @@ def main(errors: str, folder: str) -> None:
     right.set_xlabel(f"mean absolute error after {last['time']:g} s [rad], [rad/s]")
     right.set_title("each flight, plant")
     right.legend(fontsize=8)
-    figure.savefig(Path(folder) / "validation_errors.png", dpi=110)
+    figure.savefig(folder / "validation_errors.png", dpi=110)
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    command_line(main)

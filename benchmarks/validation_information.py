@@ -1,15 +1,17 @@
 """Information of the start state and of the commands about attitude and rate after 0.5 s.
 
-`python -m benchmarks.validation_information MAPPING FLIGHTS...` fits regressions without physics to all flights except
-one, predicts that one, and prints the errors by the inputs of the regression: the start state, commands before the
-window, and commands up to some time in the window.
+    python -m benchmarks.validation_information MAPPING FLIGHTS...
+
+Fits regressions without physics to all flights except one, predicts that one, and prints the mean absolute rate error
+and the mean angle of the attitude error by the inputs of the regression: the start state, commands before the window,
+and commands up to some time in the window.
 """
 
-import sys
 from pathlib import Path
 
 import numpy as np
 
+from benchmarks._command import command_line
 from lapwing.studies.flight_import.open_flight import open_flight
 from lapwing.studies.validation.linear_baseline import RIDGE, SLICE, _regressors, _targets
 from lapwing.studies.validation.windows import window_starts
@@ -18,11 +20,10 @@ LONGEST, STATES, PAST = 50, 9, 2  # samples of a window; columns of the state; s
 STRIDE = 10  # samples between the starts of two windows
 
 
-def main(mapping: str, *paths: str) -> None:
-    """Print the mean absolute rate error, mean over axes, and the mean angle of the attitude error."""
-    flights = [open_flight(Path(path), mapping) for path in paths]
-    starts = [window_starts(flight, LONGEST, STRIDE) for flight in flights]
-    used = [(f, s) for f, s in zip(flights, starts, strict=True) if len(s)]
+def main(mapping: str, flights: list[Path]) -> None:
+    recordings = [open_flight(path, mapping) for path in flights]
+    starts = [window_starts(recording, LONGEST, STRIDE) for recording in recordings]
+    used = [(f, s) for f, s in zip(recordings, starts, strict=True) if len(s)]
     regressors = [_regressors(f, s, LONGEST) for f, s in used]
     desired = [_targets(f, s, (LONGEST,))[:, 6:] for f, s in used]
     rotors = used[0][0].rotors
@@ -44,4 +45,4 @@ def main(mapping: str, *paths: str) -> None:
 
 
 if __name__ == "__main__":
-    main(*sys.argv[1:])
+    command_line(main)

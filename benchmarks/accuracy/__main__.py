@@ -1,5 +1,6 @@
 """python -m benchmarks.accuracy."""
 
+from benchmarks._command import command_line
 from benchmarks.accuracy import main
 
-main()
+command_line(main)

@@ -1,6 +1,6 @@
 """Cycle time of the lock step compared with equal federations of HELICS and mosaik, interleaved in one run.
 
-    python -m benchmarks.federations [CYCLES] [REPEATS]
+    python -m benchmarks.federations [--cycles N] [--repeats N]
 
 Plant, sensors, autopilot and trajectory, each in a process, exchange the same numbers at every tick as in
 `benchmarks.lockstep`, without computation. A cycle is plant, sensors, autopilot, plant. The data have the most suitable
@@ -25,7 +25,7 @@ OTHERS = {"HELICS": "helics", "mosaik": "mosaik"}  # packages; the module of the
 PATIENCE = 120.0  # [s] limit of a federation
 
 
-def main(cycles=1000, repeats=1):
+def main(cycles: int = 1000, repeats: int = 1) -> list[Row]:
     result, others = [], [name for name, package in OTHERS.items() if find_spec(package)]
     for name in OTHERS.keys() - others:
         print(f"{name} is not installed: pip install 'lapwing[bench]'")

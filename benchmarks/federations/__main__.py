@@ -1,5 +1,6 @@
-import sys
+"""python -m benchmarks.federations."""
 
+from benchmarks._command import command_line
 from benchmarks.federations import main
 
-main(*[int(a) for a in sys.argv[1:]])
+command_line(main)

@@ -1,11 +1,14 @@
 """Other simulators on Lapwing's problems: `accuracy` (used by `benchmarks.accuracy`) and `stability`.
 
-    python -m benchmarks.other_simulators [CASE...]
+    python -m benchmarks.other_simulators [CASES...]
 
 Each folder has one file per simulator. A simulator whose package is not installed is skipped.
 """
 
 from types import ModuleType
+from typing import Annotated
+
+from typer import Argument
 
 from lapwing.dynamics import discovery
 
@@ -23,8 +26,7 @@ def installed(package: str) -> list[ModuleType]:
     return modules
 
 
-def main(cases: tuple[str, ...] = ()) -> None:
-    """Print the stability cases with the results of other simulators."""
+def main(cases: Annotated[list[str], Argument()] = []) -> None:  # noqa: B006 (of a command line)
     from benchmarks.other_simulators import stability
 
     stability.main(cases)

@@ -1,7 +1,6 @@
-"""python -m benchmarks.other_simulators [CASE...]."""
+"""python -m benchmarks.other_simulators."""
 
-import sys
-
+from benchmarks._command import command_line
 from benchmarks.other_simulators import main
 
-main(tuple(sys.argv[1:]))
+command_line(main)
