@@ -1,5 +1,6 @@
 """Participants leave a run once the others have confirmed their last message or left."""
 
+import queue
 import threading
 from collections import Counter
 from contextlib import contextmanager
@@ -74,3 +75,24 @@ def test_external_service_confirms_by_leaving_or_timeout(monkeypatch):
     monkeypatch.setattr(lapwing.cosim.executors.peer_tracker, "EXTERNAL_GRACE", 0.1)
     with joined(monkeypatch, external=("other",)) as (process, _):
         process.leave(lambda: None)
+
+
+def test_participant_that_left_before_another_looked_counts_as_joined(monkeypatch):
+    monkeypatch.setattr(lapwing.cosim.executors.stop_request.signal, "signal", lambda *_: None)
+    monkeypatch.setattr(lapwing.cosim.executors.participant, "on_compile", lambda messages: None)
+    monkeypatch.setattr(lapwing.cosim.executors.participant, "JOIN_TIMEOUT", 5.0)
+    with private_endpoints(["plant"]) as endpoints, ZenohBus([endpoints["plant"]], awaits=False) as bus:
+        process = Participant("plant", SETUP, bus, PublisherIds(PREFIX), ["plant", "other"])
+        declare = bus.declare_liveliness
+
+        def declare_late(key):
+            undeclare, changes = declare(key), queue.SimpleQueue()
+            bus.watch_liveliness(f"{PREFIX}/{ALIVE_KEY}/other", lambda key, alive: changes.put(alive))
+            with ZenohBus(connect=[endpoints["plant"]]) as other:
+                other.declare_liveliness(f"{PREFIX}/{ALIVE_KEY}/other")
+                assert changes.get(timeout=60.0)
+            assert not changes.get(timeout=60.0)
+            return undeclare
+
+        monkeypatch.setattr(bus, "declare_liveliness", declare_late)
+        process.join()

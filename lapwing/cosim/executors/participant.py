@@ -28,6 +28,7 @@ from lapwing.messages.topics import Topic
 __all__ = ["PATIENCE", "POLL", "Participant", "Stopped"]
 
 POLL = 0.1  # [s] between two checks whether to stop
+JOIN_POLL = 0.05  # [s] between two of these checks, and services of a link, while others are absent
 OUTSIDE_PERIOD = 0.4  # [s] between two messages about a program outside the run
 PATIENCE = 1.0  # [s] of waiting before a service publishes what it waits for
 JOIN_TIMEOUT = 600.0  # [s] for the other participants to compile their kernels and to appear
@@ -137,26 +138,23 @@ class Participant(StopRequest):
             LockStepError: a participant did not appear.
             ValueError: another participant has another run configuration; names the first difference.
         """
-        self._peers.watch(self.bus, self.key_prefix)
+        self._peers.watch(self.bus, self.key_prefix)  # before its own declaration: others may leave soon after it
         self.bus.answer(f"{self.key_prefix}/{SETUP_KEY}/{self.name}", compress(self.setup))
         self.bus.declare_liveliness(f"{self.key_prefix}/{ALIVE_KEY}/{self.name}")
-        self._await([other for other in self.others if other != self.name], on_wait)
+        self._await(self.others, on_wait)
         limit_silence(LEASE_MS)
         if self.compares:
             self._compare()
 
-    def _await(self, names: list[str], on_wait: Callable[[], None]) -> None:
-        def stop() -> bool:
+    def _await(self, names: Collection[str], on_wait: Callable[[], None]) -> None:
+        deadline = time.monotonic() + JOIN_TIMEOUT
+        while (absent := self._peers.missing(names)) and not self.stopping:
             on_wait()
-            return self.stopping
-
-        keys = [f"{self.key_prefix}/{ALIVE_KEY}/{other}" for other in names]
-        missing_keys = self.bus.wait_for_liveliness(keys, timeout=JOIN_TIMEOUT, stop=stop)
+            if time.monotonic() > deadline:
+                raise LockStepError(f"{self.name}: no participant {', '.join(absent)} within {JOIN_TIMEOUT:g} s")
+            self._await_change(JOIN_POLL)
         if self.stopping:
             raise Stopped
-        if missing_keys:
-            absent = ", ".join(key.rsplit("/", 1)[1] for key in missing_keys)
-            raise LockStepError(f"{self.name}: no participant {absent} within {JOIN_TIMEOUT:g} s")
 
     def _compare(self) -> None:
         """Raise ValueError if another participant has another run configuration."""
@@ -230,6 +228,12 @@ class Participant(StopRequest):
                     self.publish_status(*status)
                 repeat()
                 last_repeat = now
-            if self._peers.changed.wait(BRIEF):
-                self._peers.changed.clear()
+            if self._await_change(BRIEF):
                 last_change = now
+
+    def _await_change(self, seconds: float) -> bool:
+        """Wait until a participant has appeared, confirmed or left; return False after `seconds`."""
+        changed = self._peers.changed.wait(seconds)
+        if changed:
+            self._peers.changed.clear()
+        return changed

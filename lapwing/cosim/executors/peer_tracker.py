@@ -26,6 +26,7 @@ class PeerTracker:
         """
         self._name, self._external = name, set(external)
         self._present = set(others) - {name}
+        self._seen = {name}  # participants that have been present
         self._confirmed: dict[str, set[str]] = {}  # names of participants by the key of their token
         self.changed = threading.Event()
 
@@ -34,6 +35,13 @@ class PeerTracker:
         bus.watch_liveliness(f"{key_prefix}/{ALIVE_KEY}/*", self._note_presence)
         for key in (HEARD_KEY, LOGGED_KEY):
             bus.watch_liveliness(f"{key_prefix}/{key}/*", self._note_confirmation)
+
+    def missing(self, names: Iterable[str]) -> list[str]:
+        """Return those of these participants that have never been present.
+
+        One that has left counts as seen: on a busy machine a participant may look after the run has ended.
+        """
+        return sorted(set(names) - self._seen)
 
     def unconfirmed(self, key: str, only: Collection[str] | None, waited: float) -> list[str]:
         """Return the names of the present participants that have not declared the token `key`.
@@ -53,6 +61,7 @@ class PeerTracker:
         if not alive:
             self._present.discard(name)
         elif name != self._name:
+            self._seen.add(name)
             self._present.add(name)
         self.changed.set()
 

@@ -4,7 +4,6 @@ The single-process mode needs no bus.
 """
 
 import json
-import queue
 import threading
 import time
 import uuid
@@ -191,24 +190,6 @@ class ZenohBus:
             if reply.ok is not None:
                 return reply.ok.payload.to_bytes()
         return None
-
-    def wait_for_liveliness(
-        self, keys: Iterable[str], timeout: float, stop: Callable[[], bool] = lambda: False
-    ) -> list[str]:
-        """Wait until a participant is present for each key. Return the keys that are missing after `timeout` [s]."""
-        missing = set(keys)
-        arrivals: queue.SimpleQueue = queue.SimpleQueue()
-        for folder in {key.rpartition("/")[0] for key in missing}:
-            self.watch_liveliness(f"{folder}/*", lambda key, alive: arrivals.put((key, alive)))
-        deadline = time.monotonic() + timeout
-        while missing and time.monotonic() < deadline and not stop():
-            try:
-                key, alive = arrivals.get(timeout=0.05)
-            except queue.Empty:
-                continue
-            if alive:
-                missing.discard(key)
-        return sorted(missing)
 
     def close(self) -> None:
         """Close the session.

@@ -235,6 +235,16 @@ def test_process_that_does_not_exit_is_named(run):
         run.update_for(1.0)
 
 
+def test_process_that_does_not_exit_tells_its_reason(run):
+    run.start()
+    run.monitor.ended, run.monitor.outcome = True, ""
+    run.monitor.waiting["recorder"] = "the messages of plant from tick 7 on"
+    run.exit("plant", "sensors")
+    end = "recorder: did not end within 10 s of the last message"
+    with fails(f"{end}; recorder waits for the messages of plant from tick 7 on"):
+        run.update_for(SHUTDOWN_TIMEOUT + 1.0)
+
+
 def test_first_cause_of_early_end_is_reported(run):
     run.start()
     run.monitor.ended, run.monitor.outcome = True, "sensors was ended by SIGTERM"
