@@ -90,5 +90,7 @@ def test_limit_equals_that_of_doubles(value, expected) -> None:
     assert value == expected or (value != value and expected != expected)
 
 
-def test_digits_of_other_users_stay() -> None:
-    assert mpmath.mp.dps == 15
+def test_digits_are_independent_of_other_users_of_mpmath() -> None:
+    with mpmath.workdps(5):
+        third = Number(1) / 3
+    assert third == Number(1) / 3
