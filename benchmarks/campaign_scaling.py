@@ -2,7 +2,7 @@
 
     python -m benchmarks.campaign_scaling [--most RUNS]
 
-Two seconds of hover on one worker, 100, 1000, 10000 ... runs up to MOST, each campaign in a separate process.
+Two seconds of hover on one worker, 100, 1000, 10000 ... runs, each campaign in a separate process.
 """
 
 import os

@@ -21,7 +21,7 @@ Kind = StrEnum("Kind", {name: name for name in DRAWS})
 
 
 def main(
-    kind: Annotated[Kind, Option(help="random or special landings")] = Kind("random"),  # noqa: B008
+    kind: Annotated[Kind, Option(help="random or special landings")] = Kind.random,
     first: Annotated[int, Option(help="number of the first landing")] = 0,
     count: Annotated[int, Option(help="number of landings")] = 200,
     processes: Annotated[int | None, Option(help="landings flown at once; default: number of processors")] = None,

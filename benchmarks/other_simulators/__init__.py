@@ -26,7 +26,7 @@ def installed(package: str) -> list[ModuleType]:
     return modules
 
 
-def main(cases: Annotated[list[str], Argument()] = []) -> None:  # noqa: B006 (of a command line)
+def main(cases: Annotated[list[str] | None, Argument()] = None) -> None:
     from benchmarks.other_simulators import stability
 
-    stability.main(cases)
+    stability.main(cases or ())

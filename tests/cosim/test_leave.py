@@ -23,16 +23,24 @@ SETUP = RunConfig("", "", 1, 1, 250, 4_000_000, "gauss_seidel", "drone1", {}, {}
 
 
 @contextmanager
-def joined(monkeypatch, external=()):
-    """Yield a joined participant, and the session of the only other one."""
+def participant(monkeypatch, external=()):
+    """Yield a participant that has not joined, and its endpoint."""
     monkeypatch.setattr(lapwing.cosim.executors.stop_request.signal, "signal", lambda *_: None)
     monkeypatch.setattr(lapwing.cosim.executors.participant, "on_compile", lambda messages: None)
     with private_endpoints(["plant"]) as endpoints, ZenohBus([endpoints["plant"]], awaits=False) as bus:
-        process = Participant("plant", SETUP, bus, PublisherIds(PREFIX, external=external), ["plant", "other"])
-        with ZenohBus(connect=[endpoints["plant"]]) as other:
-            other.declare_liveliness(f"{PREFIX}/{ALIVE_KEY}/other")
-            process.join()
-            yield process, other
+        yield (
+            Participant("plant", SETUP, bus, PublisherIds(PREFIX, external=external), ["plant", "other"]),
+            endpoints["plant"],
+        )
+
+
+@contextmanager
+def joined(monkeypatch, external=()):
+    """Yield a joined participant, and the session of the only other one."""
+    with participant(monkeypatch, external) as (process, endpoint), ZenohBus(connect=[endpoint]) as other:
+        other.declare_liveliness(f"{PREFIX}/{ALIVE_KEY}/other")
+        process.join()
+        yield process, other
 
 
 def test_missing_confirmation_is_named(monkeypatch):
@@ -78,17 +86,15 @@ def test_external_service_confirms_by_leaving_or_timeout(monkeypatch):
 
 
 def test_participant_that_left_before_another_looked_counts_as_joined(monkeypatch):
-    monkeypatch.setattr(lapwing.cosim.executors.stop_request.signal, "signal", lambda *_: None)
-    monkeypatch.setattr(lapwing.cosim.executors.participant, "on_compile", lambda messages: None)
     monkeypatch.setattr(lapwing.cosim.executors.participant, "JOIN_TIMEOUT", 5.0)
-    with private_endpoints(["plant"]) as endpoints, ZenohBus([endpoints["plant"]], awaits=False) as bus:
-        process = Participant("plant", SETUP, bus, PublisherIds(PREFIX), ["plant", "other"])
+    with participant(monkeypatch) as (process, endpoint):
+        bus = process.bus
         declare = bus.declare_liveliness
 
         def declare_late(key):
             undeclare, changes = declare(key), queue.SimpleQueue()
             bus.watch_liveliness(f"{PREFIX}/{ALIVE_KEY}/other", lambda key, alive: changes.put(alive))
-            with ZenohBus(connect=[endpoints["plant"]]) as other:
+            with ZenohBus(connect=[endpoint]) as other:
                 other.declare_liveliness(f"{PREFIX}/{ALIVE_KEY}/other")
                 assert changes.get(timeout=60.0)
             assert not changes.get(timeout=60.0)

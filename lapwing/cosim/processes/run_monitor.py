@@ -199,6 +199,10 @@ class RunMonitor:
         cause = f": {self.outcome}" if self.outcome else ""
         return f"the run ended early at t = {self.time_ns * 1e-9:.3f} s{cause}"
 
+    def waits(self, names: Iterable[str]) -> list[str]:
+        """Return a text for each of these participants that has reported what it waits for."""
+        return [f"{name} waits for {self.waiting[name]}" for name in names if name in self.waiting]
+
     def stall_message(
         self, names: Iterable[str], starved: Callable[[Iterable[str]], float] = lambda names: 0.0
     ) -> str | None:
@@ -220,4 +224,4 @@ class RunMonitor:
         where = f"at t = {self.time_ns * 1e-9:.3f} s"
         if silent:
             return f"{', '.join(silent)}: no answer for {self._patience:g} s, {where}"
-        return f"the run is blocked {where}: " + "; ".join(f"{n} waits for {w}" for n, w in self.waiting.items())
+        return f"the run is blocked {where}: {'; '.join(self.waits(self.waiting))}"

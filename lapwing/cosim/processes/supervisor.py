@@ -167,9 +167,8 @@ class RunSupervisor:
             raise RunFailed(message)
         running = [name for name in self._own if self._children[name].process.poll() is None]
         silent = [name for name in running if name not in monitor.confirmed] or running
-        waiting = "".join(f"; {name} waits for {monitor.waiting[name]}" for name in silent if name in monitor.waiting)
-        text = f"did not end within {SHUTDOWN_TIMEOUT:g} s of the last message{waiting}"
-        raise RunFailed(f"{', '.join(silent)}: {text}")
+        text = f"{', '.join(silent)}: did not end within {SHUTDOWN_TIMEOUT:g} s of the last message"
+        raise RunFailed("; ".join([text, *monitor.waits(silent)]))
 
     def _starved(self, names: Iterable[str]) -> float:
         """Return the time [s] that these processes, and this one, have waited for a processor since the last news."""

@@ -1,6 +1,6 @@
 """Numbers with 32 decimal digits and the functions of `lapwing.kernels.math` for them, from mpmath.
 
-Operations without a finite real result return infinity or NaN, as those of doubles do.
+Operations without a finite real result return infinity or NaN, as those of doubles do. There is no negative zero.
 """
 
 from collections.abc import Callable

@@ -47,6 +47,18 @@ def test_function_equals_that_of_kernels(name: str) -> None:
             np.testing.assert_allclose(result.astype(float), expected.astype(float), rtol=1e-15, atol=1e-16)
 
 
+@pytest.mark.parametrize("name", [n for n in RANGES if n not in ("copysign", "isfinite", "pow", "sincos", "square")])
+def test_function_has_digits(name: str) -> None:
+    rng = random.Random(3)
+    for _ in range(100):
+        values = [Number(rng.uniform(*limits)) / 3 for limits in RANGES[name]]
+        with mpmath.workdps(50):
+            x = [mpmath.mpf(value) for value in values]
+            exact = mpmath.sign(x[0]) * mpmath.cbrt(abs(x[0])) if name == "cbrt" else getattr(mpmath, name)(*x)
+            result = mpmath.mpf(FUNCTIONS[name](*values))
+            assert abs(result - exact) <= 1e-30 * abs(exact)
+
+
 def test_third_has_32_digits() -> None:
     with mpmath.workdps(50):
         error = abs(mpmath.mpf(Number(1) / 3) - mpmath.mpf(1) / 3)
@@ -88,6 +100,11 @@ def test_operation_with_number_keeps_digits(left) -> None:
 )
 def test_limit_equals_that_of_doubles(value, expected) -> None:
     assert value == expected or (value != value and expected != expected)
+
+
+def test_division_of_other_users_of_mpmath_still_raises() -> None:
+    with pytest.raises(ZeroDivisionError):
+        mpmath.mpf(1) / 0
 
 
 def test_digits_are_independent_of_other_users_of_mpmath() -> None:
