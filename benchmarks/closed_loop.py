@@ -1,17 +1,15 @@
-"""Closed-loop flights for Monte Carlo on one core: speed and accuracy of Lapwing, RotorPy and JSBSim.
+"""Closed-loop flights for Monte Carlo on one core: speed and accuracy of Lapwing and RotorPy.
 
     python -m benchmarks.closed_loop
 
 Simulated seconds per second of processor time, the median of interleaved repeats, of flights of two seconds:
 
 - `hover` as in campaigns, with its metrics (steps of 1 ms, control at 250 Hz);
-- RotorPy's Crazyflie, which flies to a point 0.5 m away under its SE(3) controller, with default settings (100 Hz, RK45
-  of SciPy);
-- a quadrotor in JSBSim (`_jsbsim.py`), which flies as far under cascaded PID in JSBSim's flight control system, with
-  steps of 1 ms and with one step per control interval, without metrics.
+- RotorPy's Crazyflie (extra `bench`), which flies to a point 0.5 m away under its SE(3) controller, with default
+  settings (100 Hz, RK45 of SciPy).
 
 The error is that of the last position relative to the same simulator with an eighth of the step or a relative tolerance
-of 1e-10. Simulators that are not installed (extra `bench`) are skipped.
+of 1e-10.
 """
 
 import time
@@ -23,16 +21,15 @@ from typing import NamedTuple
 import numpy as np
 
 from benchmarks._command import command_line
-from benchmarks._jsbsim import CONTROL, JsbsimQuad
 from benchmarks._targets import Row, show
 from lapwing.services.scene_resolver import load
-from lapwing.studies.campaign.campaign_config import TOPICS, campaign_setup
+from lapwing.studies.campaign.campaign_config import TOPICS, campaign_config
 from lapwing.studies.campaign.plan import plan
 from lapwing.studies.campaign.runs import row_of
 from lapwing.studies.simulate import fly
 
 SECONDS, RUNS, REPEATS = 2.0, 10, 3
-AWAY = 0.5  # [m] distance of the target of the other simulators
+AWAY = 0.5  # [m] distance of RotorPy's target
 STEP = 1e-3  # [s]
 OVERRIDES = (f"run.duration={SECONDS}",)
 GIVEN, ROWS = plan("hover", OVERRIDES, runs=1000), {}
@@ -46,7 +43,7 @@ def lapwing_flights():
 def lapwing_error():
     steps = STEP, STEP / 8
     ends = [
-        fly(campaign_setup(load("hover", [*OVERRIDES, f"solver.step={h}"])), TOPICS).truth.position[-1] for h in steps
+        fly(campaign_config(load("hover", [*OVERRIDES, f"solver.step={h}"])), TOPICS).truth.position[-1] for h in steps
     ]
     return largest_difference(*ends)
 
@@ -80,24 +77,7 @@ def simulators():
         result["RotorPy"] = Simulator(
             rotorpy, 1, lambda: largest_difference(rotorpy(), rotorpy(rtol=1e-10, atol=1e-12))
         )
-    if find_spec("jsbsim"):
-        for step in (STEP, CONTROL):
-            result[f"JSBSim, steps of {1e3 * step:g} ms"] = in_jsbsim(step)
     return result
-
-
-def in_jsbsim(step):
-    """Return JSBSim with steps of `step` [s]."""
-    vehicle = JsbsimQuad(step)
-
-    def fly():
-        for _ in range(RUNS):
-            vehicle.fly(SECONDS, (AWAY, 0.0, 0.0))
-
-    def last(of):
-        return of.fly(SECONDS, (AWAY, 0.0, 0.0))
-
-    return Simulator(fly, RUNS, lambda: largest_difference(last(vehicle), last(JsbsimQuad(step / 8))))
 
 
 def largest_difference(one, other):
@@ -122,8 +102,8 @@ def main():
     for name in list(result)[1:]:
         ratio = median(a / b for a, b in zip(rates["lapwing"], rates[name], strict=True))
         rows.append(Row(f"closed-loop flights to {name}, one core", ratio, "", 3.0, True))
-    if len(result) < 4:
-        print("not all are installed: pip install 'lapwing[bench]'")
+    if not rows:
+        print("RotorPy is not installed: pip install 'lapwing[bench]'")
     return show(rows)
 
 

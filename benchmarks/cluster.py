@@ -9,9 +9,9 @@ Shards of 250 runs with immediate results, on one worker; scheduler and command 
 import time
 
 from benchmarks._command import command_line
+from lapwing.flights.metrics import METRICS
 from lapwing.studies.campaign.cluster import dask
 from lapwing.studies.campaign.folder import MAX_SHARD_SIZE as RUNS
-from lapwing.studies.metrics import METRICS
 
 
 def rows(shard):

@@ -83,9 +83,9 @@ def per_second(flight):
 
 def single_process(path, log, duration):
     """Return the processor time [s] of a flight in this process."""
-    setup = resolve(load(path, [f"run.duration={duration}"]))
+    config = resolve(load(path, [f"run.duration={duration}"]))
     began = time.process_time()
-    fly_single(setup, log)
+    fly_single(config, log)
     return time.process_time() - began
 
 

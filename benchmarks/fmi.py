@@ -16,10 +16,10 @@ import numpy as np
 from benchmarks._command import command_line
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
-from lapwing.cosim.diagram.compiled_block import run
-from lapwing.fmi.fmu import export_fmu
-from lapwing.fmi.memory_image import image_of
-from lapwing.fmi.native_build import compiler
+from lapwing.cosim.diagram.compiled_loop import run
+from lapwing.fmi.export.fmu import export_fmu
+from lapwing.fmi.export.memory_image import image_of
+from lapwing.fmi.export.native_build import compiler
 from lapwing.services import scene_resolver
 from lapwing.services.process_table import create_all
 
@@ -55,12 +55,12 @@ def in_the_air(diagram: BlockDiagram) -> None:
     ctypes.c_double.from_address(region.address + leaf.offset - region.offset).value = HEIGHT
 
 
-def step_in_run(setup: RunConfig) -> float:
+def step_in_run(config: RunConfig) -> float:
     """Return the time of a plant step in the compiled loop of a run [us]: full inputs, zero motor voltage."""
 
     def once() -> float:
-        services = [s for s in create_all(setup) if s.name == "plant"]
-        diagram = BlockDiagram(setup, services, 1)  # owns the memory of the group
+        services = [s for s in create_all(config) if s.name == "plant"]
+        diagram = BlockDiagram(config, services, 1)  # owns the memory of the group
         in_the_air(diagram)
         (group,) = diagram._groups
         run(group._cell, 0, 0, 10)
@@ -86,10 +86,10 @@ def main(scene: str = "delivery_mission", rate: int = 1000) -> None:
     import fmpy
 
     settings = [f"communication.rate={rate}", f"solver.step={1.0 / rate!r}"]
-    setup = scene_resolver.resolve(scene_resolver.load(scene, settings))
+    config = scene_resolver.resolve(scene_resolver.load(scene, settings))
     with tempfile.TemporaryDirectory() as name:
         path = Path(name) / "plant.fmu"
-        export_fmu(setup, "plant", path)
+        export_fmu(config, "plant", path)
         folder = fmpy.extract(str(path))
         model = fmpy.read_model_description(str(path))
         binary = next(Path(folder).glob("binaries/*/*.so"))
@@ -116,15 +116,15 @@ def main(scene: str = "delivery_mission", rate: int = 1000) -> None:
             library.fmi3SetFloat64(ctypes.c_void_p(instance), *reference, *height)
             enter(instance, False, 0.0, 0.0, False, 0.0)
             library.fmi3ExitInitializationMode(instance)
-            loop(address, instance, 0, setup.interval, 10)
-            result = loop(address, instance, 10, setup.interval, STEPS) / STEPS * 1e6
+            loop(address, instance, 0, config.interval, 10)
+            result = loop(address, instance, 10, config.interval, STEPS) / STEPS * 1e6
             end(instance)
             return result
 
-        inside, outside = step_in_run(setup), best(once)
+        inside, outside = step_in_run(config), best(once)
         began = time.perf_counter()
         end(instantiate())
-        print(f"{scene}: tick {setup.interval * 1e3:g} ms, free fall")
+        print(f"{scene}: tick {config.interval * 1e3:g} ms, free fall")
         print(f"  step in the run {inside:.2f} us, doStep {outside:.2f} us, ratio {outside / inside:.2f}")
         print(
             f"  instantiate {1e3 * (time.perf_counter() - began):.3f} ms, binary {binary.stat().st_size / 1e6:.3f} MB"
@@ -153,11 +153,11 @@ def import_overhead(scene: str, settings: list[str], path: Path, own: float) -> 
         "outputs = {" + ", ".join(f'"{columns[name]}" = "{name}"' for name in outputs) + "}",
     ]
     table = f"services.copy={{{', '.join(entries)}}}"
-    setups = [scene_resolver.resolve(scene_resolver.load(scene, [*settings, *more])) for more in ([], [table])]
+    configs = [scene_resolver.resolve(scene_resolver.load(scene, [*settings, *more])) for more in ([], [table])]
     times, flights = np.empty((IMPORT_REPEATS, 2, IMPORT_STEPS)), [b"", b""]
     for k in range(IMPORT_REPEATS):
-        for which, setup in enumerate(setups):
-            diagram = BlockDiagram(setup, create_all(setup), 1)
+        for which, config in enumerate(configs):
+            diagram = BlockDiagram(config, create_all(config), 1)
             in_the_air(diagram)
             diagram.advance(SETTLE)  # starts the process of the FMU
             for step in range(IMPORT_STEPS):

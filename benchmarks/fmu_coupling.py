@@ -17,7 +17,7 @@ from fmpy.fmi3 import FMU3Slave
 
 from benchmarks._command import command_line
 from lapwing.cosim.config.run_config import RunConfig
-from lapwing.fmi.fmu import export_fmu
+from lapwing.fmi.export.fmu import export_fmu
 from lapwing.messages.topics import TRUTH
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.accuracy.error_budget import noise_overrides, rate_overrides
@@ -71,7 +71,7 @@ class Part:
         return [float(values[v.valueReference]) for v in own]
 
 
-def coupled(setup: RunConfig, paths: dict[str, Path], jacobi: bool, ticks: int) -> np.ndarray:
+def coupled(config: RunConfig, paths: dict[str, Path], jacobi: bool, ticks: int) -> np.ndarray:
     """Return the columns of `truth` at each tick, shape (ticks, n); the first three are the position [m].
 
     The FMUs step in the order of `paths`, the plant first. In a Gauss-Seidel coupling, those without direct
@@ -92,7 +92,7 @@ def coupled(setup: RunConfig, paths: dict[str, Path], jacobi: bool, ticks: int) 
         early = {part.name: part.values() for part in parts if jacobi or not part.has_feedthrough}
         for part in parts:
             part.set(early[part.name] if part.name in early else part.values())
-            part.fmu.doStep(k * setup.interval, setup.interval)
+            part.fmu.doStep(k * config.interval, config.interval)
         rows.append(plant.row("truth"))
     for part in parts:
         part.fmu.freeInstance()
@@ -124,12 +124,12 @@ def main(scene: str = "delivery_mission", rates: Annotated[list[int], typer.Argu
     for rate in rates:
         own = lapwing_positions(scene, settings(rate), "gauss_seidel")
         parallel = lapwing_positions(scene, settings(rate), "jacobi")
-        setup = resolve(load(scene, settings(rate)))
+        config = resolve(load(scene, settings(rate)))
         with tempfile.TemporaryDirectory() as name:
-            paths = {part: Path(name) / f"{part}.fmu" for part in setup.order}
+            paths = {part: Path(name) / f"{part}.fmu" for part in config.order}
             for part, path in paths.items():
-                export_fmu(setup, part, path)
-            sequential, jacobi = (coupled(setup, paths, way, len(own))[:, :3] for way in (False, True))
+                export_fmu(config, part, path)
+            sequential, jacobi = (coupled(config, paths, way, len(own))[:, :3] for way in (False, True))
         cells = (
             distance(sequential, own),
             distance(jacobi, parallel),

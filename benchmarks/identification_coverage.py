@@ -13,15 +13,15 @@ from pathlib import Path
 
 import numpy as np
 
+from lapwing.flights.log_import.recording import Recording
 from lapwing.services.scene_resolver import load_one
-from lapwing.studies.flight_import.recording import Recording
 from lapwing.studies.identification.instrumental_variables import moments
 from lapwing.studies.identification.output_error import INSTRUMENT, OutputError
 from lapwing.studies.identification.procedure import start_value
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.start_states import NO_TRIM
 
-sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "studies"))
+sys.path.insert(0, str(Path(__file__).parents[1] / "tests" / "flights"))
 from flight_recordings import INTERVAL, simulated
 
 from benchmarks._command import command_line

@@ -53,31 +53,31 @@ class Constant:
 
     def __init__(self, name, cycles):
         self.name, self.inputs, self.outputs = name, *PARTS[name]
-        self.rows = [(port.name, pack_row(port.like)) for port in self.outputs]
+        self.rows = [(port.name, pack_row(port.example)) for port in self.outputs]
         self.cycles, self.stamps = cycles, []
 
-    def bind(self, graph):
-        self.graph = graph
+    def bind(self, diagram):
+        self.diagram = diagram
 
     def on_tick(self, tick):
         for name, row in self.rows:
-            self.graph.put_row(name, tick, row)
+            self.diagram.put_row(name, tick, row)
         if self.name == "plant":
             self.stamps.append(time.perf_counter())
             if tick == self.cycles:
-                self.graph.finish()
+                self.diagram.finish()
         return tick + 1
 
 
 def lockstep_process(name, peers, cycles, core):
     services = {name: ServiceConfig(None, *parts) for name, parts in PARTS.items()}
-    setup = RunConfig("benchmark", "", 1, cycles, 250, 4_000_000, "gauss_seidel", "drone1", services, {}, {})
+    config = RunConfig("benchmark", "", 1, cycles, 250, 4_000_000, "gauss_seidel", "drone1", services, {}, {})
     part = Constant(name, cycles)
-    encoders = topic_encoders(setup, NONE) if name == "plant" else []
+    encoders = topic_encoders(config, NONE) if name == "plant" else []
     participants = PublisherIds("bench")
     with ZenohBus(*mesh(name, peers), gid=participants.gid(name)) as bus:
         run_lockstep(
-            Participant(name, setup, bus, participants, list(peers), core=core),
+            Participant(name, config, bus, participants, list(peers), core=core),
             Service(name, [part], encoders),
             name == "plant",
             "recorder",

@@ -18,17 +18,17 @@ import numpy as np
 from benchmarks._command import command_line
 from benchmarks._targets import LAPWING, Row, show
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
-from lapwing.cosim.executors.single_process import PAGE
-from lapwing.runs.live_feed import LiveFeed
-from lapwing.runs.live_page import LivePage
+from lapwing.cosim.executors.single_process import KEPT_TICKS
+from lapwing.flights.flight_data import SHOWN, FlightData
+from lapwing.flights.topic_view import TopicView
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.studies.flight_data import SHOWN, FlightData
-from lapwing.studies.report import write
-from lapwing.studies.topic_view import TopicView
-from lapwing.studies.view3d.headless import Browser
-from lapwing.studies.view3d.recording import page
-from lapwing.studies.view3d.render import Shot, render
+from lapwing.views.live.live_feed import LiveFeed
+from lapwing.views.live.live_page import LivePage
+from lapwing.views.report import write
+from lapwing.views.view3d.headless import Browser
+from lapwing.views.view3d.recording import page
+from lapwing.views.view3d.render import Shot, render
 
 VEHICLES, APART = 8, 3.0  # [m] between neighbours
 SECONDS = 10.0  # [s] time in which frames are counted
@@ -122,9 +122,9 @@ class Watch:
     """Hover flight in this process with the interface of a run monitor."""
 
     def __init__(self):
-        self.setup = resolve(load("hover"))
-        self._diagram = BlockDiagram(self.setup, create_all(self.setup), PAGE)
-        self.reporting_services, self.on_batches, self.time_ns = set(self.setup.services), None, 0
+        self.config = resolve(load("hover"))
+        self._diagram = BlockDiagram(self.config, create_all(self.config), KEPT_TICKS)
+        self.reporting_services, self.on_batches, self.time_ns = set(self.config.services), None, 0
         self.complete = False
 
     def publish(self, *_):
@@ -132,17 +132,17 @@ class Watch:
 
     def step(self, seconds):
         before = self._diagram.tick
-        stop = before + round(seconds * self.setup.rate)
+        stop = before + round(seconds * self.config.rate)
         self._diagram.advance(stop)
         self.on_batches(self._diagram.record_batches(before, stop))
-        self.time_ns = (stop - 1) * self.setup.interval_ns
+        self.time_ns = (stop - 1) * self.config.interval_ns
 
 
 def first_image():
     """Return the time [s] from the first step of a flight to the first image with the vehicle in an open page."""
     watch = Watch()
-    with LivePage(watch.setup) as live:
-        feed = LiveFeed(watch.setup, [live.show])
+    with LivePage(watch.config) as live:
+        feed = LiveFeed(watch.config, [live.show])
         feed.observe(watch)
         with Browser(live.address, size=SIZE) as browser:
             browser.run("while (!document.querySelector('canvas')) await new Promise((done) => setTimeout(done, 50));")

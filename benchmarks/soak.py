@@ -125,9 +125,9 @@ def rows(samples: list[Sample], name: str) -> list[Row]:
 def processes(minutes: float, log: Path) -> list[Sample]:
     """Fly with a process for each service at full speed. Return the samples."""
     sampler = Sampler(log, minutes=minutes)
-    setup = resolve(load(SCENE, [HOVER, "run.duration=1e6"]))
+    config = resolve(load(SCENE, [HOVER, "run.duration=1e6"]))
     with suppress(Interrupted):
-        fly_processes(ProcessSpec(MONITOR, setup, {}, "soak", log=str(log)), sampler)
+        fly_processes(ProcessSpec(MONITOR, config, {}, "soak", log=str(log)), sampler)
     return sampler.samples
 
 

@@ -127,7 +127,7 @@ network="${COMPOSE_PROJECT_NAME}_default"
 authority() { $COMPOSE ps --all --quiet keys | xargs -I{} docker cp {}:/app/keys/plant/authority.pem - | sha256sum; }
 first=$(authority)
 remove_containers
-SPEED=1 LOG=recordings/shown.mcap JSON=recordings/shown.json \
+SPEED=0.5 LOG=recordings/shown.mcap JSON=recordings/shown.json \
     timeout $TIMEOUT $COMPOSE --profile view up --no-build > compose.log 2>&1 < /dev/null &
 up=$!
 waited=0

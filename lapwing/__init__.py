@@ -13,28 +13,30 @@ The names here are the public interface; each is imported at its first use.
 
 TYPE_CHECKING = False  # True for type checkers: `lapwing` imports nothing before it handles Ctrl-C
 if TYPE_CHECKING:
-    from lapwing.api import campaign, fly, load_scene, read_log
-    from lapwing.batch_simulator import BatchSimulator, BatchState
+    from lapwing.api.batch_simulator import BatchSimulator, BatchState
+    from lapwing.api.flight import Flight
+    from lapwing.api.functions import campaign, fly, load_scene, read_log
+    from lapwing.api.simulator import Observation, Simulator
     from lapwing.cosim.run_errors import LockStepError
     from lapwing.cosim.scene import Scene, SceneError
-    from lapwing.flight import Flight
+    from lapwing.flights.flight_events import Event
+    from lapwing.flights.outcome import FlightOutcome
     from lapwing.services.common.ports import Setpoint
-    from lapwing.simulator import Observation, Simulator
-    from lapwing.studies.campaign.distributions import choice, linspace, loguniform, normal, uniform
-    from lapwing.studies.flight_events import Event
-    from lapwing.studies.outcome import FlightOutcome
+    from lapwing.studies.campaign.distributions import choice, linspace, lognormal, loguniform, normal, uniform
+    from lapwing.studies.campaign.posterior import posterior
 
 _NAMES = {
-    "lapwing.api": ("campaign", "fly", "load_scene", "read_log"),
-    "lapwing.batch_simulator": ("BatchSimulator", "BatchState"),
+    "lapwing.api.functions": ("campaign", "fly", "load_scene", "read_log"),
+    "lapwing.api.batch_simulator": ("BatchSimulator", "BatchState"),
     "lapwing.cosim.run_errors": ("LockStepError",),
     "lapwing.cosim.scene": ("Scene", "SceneError"),
-    "lapwing.flight": ("Flight",),
+    "lapwing.api.flight": ("Flight",),
     "lapwing.services.common.ports": ("Setpoint",),
-    "lapwing.simulator": ("Observation", "Simulator"),
-    "lapwing.studies.campaign.distributions": ("choice", "linspace", "loguniform", "normal", "uniform"),
-    "lapwing.studies.flight_events": ("Event",),
-    "lapwing.studies.outcome": ("FlightOutcome",),
+    "lapwing.api.simulator": ("Observation", "Simulator"),
+    "lapwing.studies.campaign.distributions": ("choice", "linspace", "lognormal", "loguniform", "normal", "uniform"),
+    "lapwing.studies.campaign.posterior": ("posterior",),
+    "lapwing.flights.flight_events": ("Event",),
+    "lapwing.flights.outcome": ("FlightOutcome",),
 }
 _WHERE = {name: module for module, names in _NAMES.items() for name in names}
 
@@ -55,8 +57,10 @@ __all__ = [
     "fly",
     "linspace",
     "load_scene",
+    "lognormal",
     "loguniform",
     "normal",
+    "posterior",
     "read_log",
     "uniform",
 ]

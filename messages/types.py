@@ -1,5 +1,7 @@
 """Message classes, generated from the `.msg` files next to this module: `lapwing.messages.types.Imu` and so on."""
 
+import re
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -10,6 +12,7 @@ TYPES: dict[str, Any] = {}
 """Message class by full name ("sensor_msgs/msg/Imu")."""
 
 FOLDER = Path(__file__).parent / "msg"
+_UNIT = re.compile(r"\s*[A-Za-z][\w/]*(?:\[\d*\])?\s+(?P<name>[A-Za-z]\w*)[^#]*#[^\[]*\[(?P<unit>[^\]]+)\]")
 
 DEFINITIONS = read_folder(FOLDER)
 """Definitions of all types by full name, each after the types that it contains."""
@@ -31,6 +34,28 @@ def message_class(type_name: str) -> Any:
     if type_name not in TYPES:
         raise ValueError(f"unknown message type {type_name}; known: {', '.join(sorted(TYPES))}")
     return TYPES[type_name]
+
+
+def unit(type_name: str, field: str) -> str:
+    """Return the unit that the comment of a field's line states ("[rad/s]"), by dotted name; "" without one.
+
+    The containing field defines the unit if the field's own line does not.
+    """
+    result = ""
+    for name in field.split("."):
+        if name.isdigit():
+            continue  # an element of a sequence
+        result = _units(type_name).get(name, result)
+        type_name = next((f.base for f in DEFINITIONS[type_name].fields if f.name == name and f.nested), "")
+        if not type_name:
+            break
+    return result
+
+
+@cache
+def _units(type_name: str) -> dict[str, str]:
+    matches = map(_UNIT.match, DEFINITIONS[type_name].text.splitlines())
+    return {match["name"]: match["unit"] for match in matches if match}
 
 
 def __getattr__(name: str) -> Any:

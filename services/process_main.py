@@ -25,7 +25,7 @@ class ProcessSpec(NamedTuple):
     """Specification of a process of a run."""
 
     name: str
-    setup: RunConfig
+    config: RunConfig
     peers: dict[str, str]  # endpoint of every participant
     key_prefix: str  # first part of all Zenoh keys of the run
     secret: str = ""  # secret of a run on one machine (lapwing.cosim.access.publisher_ids)
@@ -57,7 +57,7 @@ def write_spec(spec: ProcessSpec, stream: IO[bytes]) -> None:
 def read_spec() -> ProcessSpec:
     """Read the specification of this process from standard input."""
     text = _read(_LENGTH.unpack(_read(_LENGTH.size))[0]).decode()
-    modules = json.loads(text)["setup"]["resolved"].get("modules", {})  # the run configuration may name their classes
+    modules = json.loads(text)["config"]["resolved"].get("modules", {})  # the run configuration may name their classes
     user_module.install(modules)
     result: Any = from_json(text, modules)
     return result
@@ -89,7 +89,7 @@ def run_participant(spec: ProcessSpec) -> ExitCode:
     from lapwing.services import process_table
     from lapwing.services.security import door_settings, settings
 
-    setup, encoded = spec.setup, process_table.service_of_encoder(spec.name)
+    config, encoded = spec.config, process_table.service_of_encoder(spec.name)
     entry = process_table.entry(encoded or spec.name)
     participants = PublisherIds(spec.key_prefix, spec.secret, tuple(spec.external or ()))
     listen, connect = mesh(spec.name, spec.peers)
@@ -97,12 +97,12 @@ def run_participant(spec: ProcessSpec) -> ExitCode:
         links = {} if spec.external else CHILD_LINKS
         security = door_settings(spec.name, spec.key_prefix, spec.keys) if spec.open else links
     else:
-        security = settings(setup, spec.name, spec.key_prefix, spec.keys)
+        security = settings(config, spec.name, spec.key_prefix, spec.keys)
     endpoints, gid = [*listen, *spec.open], participants.gid(spec.name)
     with ZenohBus(endpoints, connect, entry.mode, gid, security, awaits=False) as bus:
         watched = MONITOR in spec.peers and not spec.with_parent
         others = [
-            *process_table.required_processes(setup, spec.external or ()),
+            *process_table.required_processes(config, spec.external or ()),
             *([MONITOR] if MONITOR in spec.peers else []),
         ]
         if spec.with_parent:  # the run begins when each auxiliary process has opened its links
@@ -110,19 +110,20 @@ def run_participant(spec: ProcessSpec) -> ExitCode:
         # processes of one launcher have the same run configuration; an external service may have another
         compares = others if not spec.with_parent else [encoded] if encoded else []
         pace = (spec.speed, spec.core, compares, spec.realtime)
-        process = Participant(spec.name, setup, bus, participants, others, *pace)
-        process.create_service = partial(process_table.create, setup)
+        process = Participant(spec.name, config, bus, participants, others, *pace)
+        process.create_service = partial(process_table.create, config)
         if spec.with_parent:
             process.stop_with_parent(spec.peers[spec.name])
         elif watched:
             process.stop_without(MONITOR)
         try:
             if encoded:
-                run_encoder(process, process_table.create(setup, encoded))
+                run_encoder(process, process_table.create(config, encoded))
             elif entry.lock_step:
                 operators = _operator_commands(process) if spec.name == "autopilot" else {}
-                service = process_table.create(setup, spec.name, operators)
-                run_lockstep(process, service, spec.name == process_table.CLOCK_OWNER, process_table.RECORDER)
+                service = process_table.create(config, spec.name, operators)
+                owns_time, log = spec.name == process_table.CLOCK_OWNER, Path(spec.log) if spec.log else None
+                run_lockstep(process, service, owns_time, process_table.RECORDER, log)
             else:
                 entry.service().run(process, spec)
         except Stopped:
@@ -150,8 +151,8 @@ def _operator_commands(process: Any) -> dict[str, Any]:
     from lapwing.services.process_table import MAVLINK, ROS2
 
     get = process.bus.receive(process.participants.senders(OPERATOR_KEY, [MAVLINK, ROS2])).get
-    mailbox = OperatorInbox(process.setup.vehicles, lambda: get(0.0))
-    return {vehicle: partial(mailbox.take, vehicle) for vehicle in process.setup.vehicles}
+    mailbox = OperatorInbox(process.config.vehicles, lambda: get(0.0))
+    return {vehicle: partial(mailbox.take, vehicle) for vehicle in process.config.vehicles}
 
 
 def main(name: str) -> None:

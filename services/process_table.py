@@ -14,9 +14,9 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import Service
 from lapwing.cosim.diagram.multi_vehicle import members, merge_services
 from lapwing.cosim.transport.bus_keys import ENCODER
+from lapwing.fmi.importer.replaced_ports import rewire
+from lapwing.fmi.importer.service_config import fmus_of, replaced_ports
 from lapwing.services.common.foreign_code import FMU_SUFFIX
-from lapwing.services.fmu.replaced_ports import rewire
-from lapwing.services.fmu.service_config import fmus_of, replaced_ports
 
 
 class ProcessEntry(NamedTuple):
@@ -30,7 +30,7 @@ class ProcessEntry(NamedTuple):
     foreign: bool = False  # flies a foreign firmware instead of the autopilot
 
     def service(self) -> ModuleType:
-        """Import and return the module `service`; a process loads only its own."""
+        """Import and return the module with `create` or `run`; a process loads only its own."""
         match self.name:
             case "plant":
                 from lapwing.services.plant import service as plant
@@ -45,15 +45,15 @@ class ProcessEntry(NamedTuple):
 
                 return autopilot
             case "betaflight":
-                from lapwing.services.betaflight import service as betaflight
+                from lapwing.services.betaflight import link as betaflight
 
                 return betaflight
             case "ardupilot":
-                from lapwing.services.ardupilot import service as ardupilot
+                from lapwing.services.ardupilot import link as ardupilot
 
                 return ardupilot
             case "px4":
-                from lapwing.services.px4 import service as px4
+                from lapwing.services.px4 import link as px4
 
                 return px4
             case "trajectory":
@@ -65,7 +65,7 @@ class ProcessEntry(NamedTuple):
 
                 return formation
             case "fmu":
-                from lapwing.services.fmu import service as fmu
+                from lapwing.fmi.importer import service as fmu
 
                 return fmu
             case "recorder":
@@ -124,10 +124,10 @@ def entry(name: str) -> ProcessEntry:
     raise ValueError(f"unknown service {name}; expected one of {', '.join(p.name for p in PROCESSES)}")
 
 
-def required_processes(setup: RunConfig, external: Iterable[str] = ()) -> list[str]:
+def required_processes(config: RunConfig, external: Iterable[str] = ()) -> list[str]:
     """Return the names of the processes that a run requires, with an encoder for each service in `external`."""
-    own = [p.name for p in PROCESSES if (p.name in setup.services if p.lock_step else not p.optional)]
-    own += [name for name in setup.services if entry(name).name == FMU]
+    own = [p.name for p in PROCESSES if (p.name in config.services if p.lock_step else not p.optional)]
+    own += [name for name in config.services if entry(name).name == FMU]
     return own + [f"{name}{ENCODER}" for name in external]
 
 
@@ -147,9 +147,9 @@ def optional() -> list[str]:
     return [p.name for p in PROCESSES if p.optional]
 
 
-def foreign_firmware(setup: RunConfig) -> str:
+def foreign_firmware(config: RunConfig) -> str:
     """Return the names of the foreign firmwares that fly in a run, "" for Lapwing's own autopilot."""
-    return ", ".join(p.name for p in PROCESSES if p.foreign and p.name in setup.services)
+    return ", ".join(p.name for p in PROCESSES if p.foreign and p.name in config.services)
 
 
 def service_of_encoder(name: str) -> str:
@@ -161,7 +161,7 @@ Operator = Callable[[int], Iterable[Any]]  # returns the commands received until
 
 
 def create(
-    setup: RunConfig,
+    config: RunConfig,
     name: str,
     operators: Mapping[str, Operator] = MappingProxyType({}),
     recorded: Mapping[str, Any] = MappingProxyType({}),
@@ -169,7 +169,7 @@ def create(
     """Create a service of the lock step.
 
     Args:
-        setup: configuration of the run.
+        config: configuration of the run.
         name: name of the service.
         operators: by vehicle name; return the external commands up to a tick.
         recorded: by vehicle name, messages of a foreign firmware to fly again (`firmware.playback.Recorded`).
@@ -191,25 +191,25 @@ def create(
             service.parts = rewire(service.parts, replaced)
         return service
 
-    if setup.vehicle:
-        return create_member(setup)
-    users = [member for member in members(setup) if name in member.services]
+    if config.vehicle:
+        return create_member(config)
+    users = [member for member in members(config) if name in member.services]
     return merge_services(name, [(member, create_member(member)) for member in users])
 
 
 def create_all(
-    setup: RunConfig,
+    config: RunConfig,
     operator: Operator | Mapping[str, Operator] | None = None,
     recorded: Mapping[str, Any] = MappingProxyType({}),
 ) -> list[Service]:
     """Create all services of the lock step, in their order of execution.
 
     Args:
-        setup: configuration of the run.
+        config: configuration of the run.
         operator: returns the external commands up to a tick; a mapping by vehicle name for several vehicles.
         recorded: see `create`.
     """
     if operator is None:
         operator = {}
-    operators = operator if isinstance(operator, Mapping) else {setup.vehicle: operator}
-    return [create(setup, name, operators, recorded) for name in setup.order]
+    operators = operator if isinstance(operator, Mapping) else {config.vehicle: operator}
+    return [create(config, name, operators, recorded) for name in config.order]

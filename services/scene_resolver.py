@@ -15,23 +15,24 @@ from lapwing.cosim import scene as scenes
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram import multi_vehicle
 from lapwing.cosim.scene import Overrides, Scene, SceneError, Vocabulary
-from lapwing.services.common import communication_schema as exchange
-from lapwing.services.common import environment_schema, mesh_schema, run_schema, success_criteria, user_modules
-from lapwing.services.common import vehicle_schema as vehicle
-from lapwing.services.common.communication_schema import Communication
+from lapwing.services.common import user_modules
 from lapwing.services.common.firmware.schema import FIRMWARES
-from lapwing.services.common.run_schema import Run
-from lapwing.services.common.vehicle_schema import Vehicle
+from lapwing.services.common.schemas import communication_schema as exchange
+from lapwing.services.common.schemas import environment_schema, mesh_schema, run_schema, success_criteria
+from lapwing.services.common.schemas import vehicle_schema as vehicle
+from lapwing.services.common.schemas.communication_schema import Communication
+from lapwing.services.common.schemas.run_schema import Run
+from lapwing.services.common.schemas.vehicle_schema import Vehicle
 from lapwing.services.plant import models
 from lapwing.services.process_table import AUTOPILOT, FMU, PROCESSES, entry
 
 
 def _resolvers() -> dict[str, ModuleType]:
     """Return the module `resolve` of each process that has one; imported when a scene is resolved."""
+    from lapwing.fmi.importer import resolve as fmu
     from lapwing.services.ardupilot import resolve as ardupilot
     from lapwing.services.autopilot import resolve as autopilot
     from lapwing.services.betaflight import resolve as betaflight
-    from lapwing.services.fmu import resolve as fmu
     from lapwing.services.formation import resolve as formation
     from lapwing.services.mavlink import resolve as mavlink
     from lapwing.services.plant import resolve as plant
@@ -39,14 +40,14 @@ def _resolvers() -> dict[str, ModuleType]:
     from lapwing.services.sensors import resolve as sensors
     from lapwing.services.trajectory import resolve as trajectory
 
-    modules = (ardupilot, autopilot, betaflight, fmu, formation, mavlink, plant, px4, sensors, trajectory)
-    return {module.__name__.split(".")[-2]: module for module in modules}
+    modules = (ardupilot, autopilot, betaflight, formation, mavlink, plant, px4, sensors, trajectory)
+    return {"fmu": fmu, **{module.__name__.split(".")[-2]: module for module in modules}}
 
 
 def _configurations() -> list[ModuleType]:
     """Return the `schema` modules of all services."""
     folders = sorted(p.name for p in pkgutil.iter_modules(lapwing.services.__path__) if p.ispkg)
-    paths = [f"lapwing.services.{name}.schema" for name in folders]
+    paths = ["lapwing.fmi.importer.schema", *(f"lapwing.services.{name}.schema" for name in folders)]
     return [importlib.import_module(path) for path in paths if importlib.util.find_spec(path)]
 
 
@@ -79,7 +80,7 @@ def load(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
 
 
 def _load_package(path: Path, overrides: Overrides) -> Scene:
-    from lapwing.services.fmu.system_structure import scene_of_package
+    from lapwing.fmi.importer.system_structure import scene_of_package
 
     tree = scene_of_package(path, lambda name, text: dict(parse(name, text).resolved))
     return scenes.from_resolved(scenes.with_values(tree, overrides), vocabulary(), path.stem)
@@ -102,7 +103,7 @@ def from_resolved(tree: Mapping[str, Any], name: str = "scene") -> Scene:
     return scenes.from_resolved(tree, vocabulary(), name)
 
 
-def reseed(setup: RunConfig, seed: int) -> RunConfig:
+def reseed(config: RunConfig, seed: int) -> RunConfig:
     """Return the run configuration with another seed, equal to `resolve` of the scene with that seed, but faster.
 
     Raises:
@@ -111,16 +112,16 @@ def reseed(setup: RunConfig, seed: int) -> RunConfig:
     if not hasattr(seed, "__index__") or not 0 <= (number := index(seed)) < 2**63:
         raise SceneError("run.seed", f"got {seed!r}", "a whole number from 0 to 2^63 - 1")
     seed = number
-    if not setup.vehicle:
-        resolved = {**setup.resolved, Run.TABLE: {**setup.resolved[Run.TABLE], "seed": seed}}
-        return multi_vehicle.merge_configs([reseed(member, seed) for member in multi_vehicle.members(setup)], resolved)
-    services_of = dict(setup.services)
-    for name, config in services_of.items():
+    if not config.vehicle:
+        resolved = {**config.resolved, Run.TABLE: {**config.resolved[Run.TABLE], "seed": seed}}
+        return multi_vehicle.merge_configs([reseed(member, seed) for member in multi_vehicle.members(config)], resolved)
+    services_of = dict(config.services)
+    for name, settings in services_of.items():
         module = _resolvers()[entry(name).name]
         if hasattr(module, "reseed"):
-            services_of[name] = module.reseed(config, seed, setup.vehicle)
-    run = {**setup.resolved[Run.TABLE], "seed": seed}
-    return setup._replace(seed=seed, services=services_of, resolved={**setup.resolved, Run.TABLE: run})
+            services_of[name] = module.reseed(settings, seed, config.vehicle)
+    run = {**config.resolved[Run.TABLE], "seed": seed}
+    return config._replace(seed=seed, services=services_of, resolved={**config.resolved, Run.TABLE: run})
 
 
 def resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]] = MappingProxyType({})) -> RunConfig:
@@ -142,8 +143,8 @@ def resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]] = MappingProxyTyp
             members = _with_fleet_coupling(members, scene.vehicles, "vehicle.{}.")
             return multi_vehicle.merge_configs(members, dict(scene.resolved))
     with scene.located():
-        (setup,) = _with_fleet_coupling([_resolve(scene, plans)], [scene], "")
-        return setup
+        (config,) = _with_fleet_coupling([_resolve(scene, plans)], [scene], "")
+        return config
 
 
 def _with_fleet_coupling(members: list[RunConfig], vehicles: Sequence[Scene], key: str) -> list[RunConfig]:

@@ -18,19 +18,19 @@ def names() -> list[str]:
     return [*(process.name for process in PROCESSES), *encoders, MONITOR]
 
 
-def publish_permissions(setup: RunConfig, key_prefix: str) -> dict[str, list[str]]:
+def publish_permissions(config: RunConfig, key_prefix: str) -> dict[str, list[str]]:
     """Return the key expressions that each participant may publish on, by the name in its certificate."""
     result = {name: [f"{key_prefix}/*/{name}"] for name in names()}
-    result[MONITOR] += [EVENTS.zenoh_key(vehicle, key_prefix) for vehicle in setup.vehicles]
-    for name in setup.services:
-        topics = [topic.zenoh_key(setup.vehicle, key_prefix) for topic in create(setup, name).topics]
+    result[MONITOR] += [EVENTS.zenoh_key(vehicle, key_prefix) for vehicle in config.vehicles]
+    for name in config.services:
+        topics = [topic.zenoh_key(config.vehicle, key_prefix) for topic in create(config, name).topics]
         encoder = f"{name}{ENCODER}"
         result[certificate_name(name)] += [*topics, f"{key_prefix}/*/{name}"]
         result[certificate_name(encoder)] += [*topics, f"{key_prefix}/*/{name}", f"{key_prefix}/*/{encoder}"]
     return {name: list(dict.fromkeys(keys)) for name, keys in result.items()}
 
 
-def settings(setup: RunConfig, name: str, key_prefix: str, keys: str) -> dict[str, Any]:
+def settings(config: RunConfig, name: str, key_prefix: str, keys: str) -> dict[str, Any]:
     """Return the Zenoh settings for the links of a participant of a run on several hosts.
 
     Without a folder of certificates, only a router has settings: it withholds the lock step from its clients.
@@ -42,7 +42,7 @@ def settings(setup: RunConfig, name: str, key_prefix: str, keys: str) -> dict[st
         return without_viewers(key_prefix) if name == ROUTER else {}
     return {
         **tls(Path(keys), certificate_name(name)),
-        **by_certificate(key_prefix, publish_permissions(setup, key_prefix)),
+        **by_certificate(key_prefix, publish_permissions(config, key_prefix)),
     }
 
 

@@ -1,4 +1,4 @@
-"""Order of the files, peak memory of the workers, and kernels without compilation.
+"""Order of the files, nightly tests, peak memory of the workers, and kernels without compilation.
 
 Long files start first, so that no worker runs one alone at the end.
 """
@@ -35,8 +35,15 @@ def pytest_configure(config: pytest.Config) -> None:
     config.stash[_peaks] = {}
 
 
-def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Move the slowest files, in their order, then the other long tests, to the front; keep the order otherwise."""
+def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+    """Move the slowest files, in their order, then the other long tests, to the front; keep the order otherwise.
+
+    Nightly tests are left out unless `-m` names them.
+    """
+    if "nightly" not in config.option.markexpr:
+        left_out = [item for item in items if item.get_closest_marker("nightly")]
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in left_out]
     ranks = {name: rank for rank, name in enumerate(SLOWEST)}
     items.sort(key=lambda item: (ranks.get(item.path.name, len(SLOWEST)), item.get_closest_marker("long") is None))
 

@@ -165,11 +165,11 @@ def endpoints():
 
 @pytest.mark.parametrize("scene", sorted((ROOT / "lapwing/scenes").glob("*.toml")), ids=lambda path: path.stem)
 def test_required_processes_have_container_and_endpoint(scene):
-    setup = resolve(load(scene))
-    if processes.foreign_firmware(setup):
+    config = resolve(load(scene))
+    if processes.foreign_firmware(config):
         pytest.skip("flies in one container: its profile")
     peers, started = endpoints()
-    needed = {MONITOR, *processes.required_processes(setup)}
+    needed = {MONITOR, *processes.required_processes(config)}
     assert needed <= set(peers)
     assert needed <= started
 
@@ -180,6 +180,7 @@ def test_every_process_has_endpoint():
     assert {entry.name for entry in processes.PROCESSES} - one_container <= set(peers)
 
 
+@pytest.mark.nightly
 def test_cluster_flies_campaign(tmp_path):
     pytest.importorskip("distributed", reason="Dask is not installed: pip install lapwing[cluster]")
     services, port = compose(), str(free_port())
@@ -243,6 +244,7 @@ def test_viewer_with_certificate_receives_flight_and_events(tmp_path):
     assert seen[1] > 0
 
 
+@pytest.mark.nightly
 def test_groundstation_services_fly_as_separate_processes(tmp_path):
     services = compose(SCHEME="tcp", LINKS="--insecure")
     with flying(services, "groundstation", tmp_path) as (running, ports):
@@ -283,8 +285,8 @@ def test_firmware_profile_starts_mounted_program(firmware):
     host, target, mode = mount.split(":")
     assert (host[:2], mode) == ("./", "ro")
     overrides = [value for option, value in pairwise(service["command"]) if option == "--set"]
-    setup = resolve(load(service["command"][2], overrides)).services[firmware].parameters
-    assert setup.command[0].startswith(target)
+    config = resolve(load(service["command"][2], overrides)).services[firmware].parameters
+    assert config.command[0].startswith(target)
     assert service["healthcheck"] == {"disable": True}
 
 

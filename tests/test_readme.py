@@ -11,7 +11,8 @@ from pathlib import Path
 
 import pytest
 
-from lapwing.studies.view3d import headless
+from lapwing.views.view3d import headless
+from tests.combinations import NIGHTLY
 
 pytestmark = pytest.mark.long
 
@@ -24,6 +25,7 @@ COMMANDS = [
     for line in block.splitlines()
 ]
 FLOWN = [c for c in COMMANDS if c.startswith("lapwing ")]
+STUDIES = ("check hover --accuracy", "effects ", "tune ", "campaign ")  # test_options.py runs them on smaller scenes
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +76,9 @@ def _run(command, key_prefix, folder, before):
     return subprocess.run(program, cwd=folder, capture_output=True, text=True, timeout=1800)
 
 
-@pytest.mark.parametrize("command", FLOWN)
+@pytest.mark.parametrize(
+    "command", [pytest.param(c, marks=NIGHTLY) if c.removeprefix("lapwing ").startswith(STUDIES) else c for c in FLOWN]
+)
 def test_readme_command_runs(command, begun):
     done = begun[command].result()
     if done.returncode == 2 and "no headless browser" in done.stderr and headless.PROGRAM is None:
@@ -105,8 +109,11 @@ def test_readme_python_blocks_run(folder, monkeypatch):
 
 
 def test_readme_links_resolve():
-    for target in re.findall(r"\]\(([^)]+)\)", README):
+    for target, anchor in re.findall(r"\]\(([^)#]+)#?([^)]*)\)", README):
         assert (ROOT / target).exists(), target
+        if anchor:
+            headings = re.findall(r"^#+ (.*)$", (ROOT / target).read_text(), re.MULTILINE)
+            assert anchor in {heading.lower().replace(" ", "-") for heading in headings}, (target, anchor)
 
 
 def test_readme_is_short():

@@ -4,7 +4,7 @@ import sys
 from pathlib import Path
 
 import lapwing
-from lapwing.studies.view3d.render import Shot, render
+from lapwing.views.view3d.render import Shot, render
 
 HERE = Path(__file__).parent
 BUILDINGS = (  # x, y, width along x and y, top [m]

@@ -14,8 +14,8 @@ import numpy as np
 from matplotlib.axes import Axes
 
 from lapwing.dynamics.lie.quaternion import from_roll_pitch_yaw, rotation_matrix
-from lapwing.services.common.communication_schema import Communication
-from lapwing.services.common.vehicle_schema import airframe
+from lapwing.services.common.schemas.communication_schema import Communication
+from lapwing.services.common.schemas.vehicle_schema import airframe
 from lapwing.services.scene_resolver import load
 from lapwing.services.sensors.registry import parameters
 

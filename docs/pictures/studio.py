@@ -6,7 +6,7 @@ import sys
 import tempfile
 from pathlib import Path
 
-from lapwing.studies.view3d.headless import Browser
+from lapwing.views.view3d.headless import Browser
 
 HERE = Path(__file__).parent
 CHANGED = "set=run.seed=7&set=effects.random_wind_force.mean=[6.0, 2.0, 0.0]#effects"

@@ -1,5 +1,6 @@
 """Campaigns: many runs of a scene, and the comparison of two campaigns."""
 
+from contextlib import ExitStack
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -9,6 +10,7 @@ from lapwing.cli.app import app
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import check_distinct, check_not_dash, claim, claim_folder, claim_report
 from lapwing.cli.preflight import check_firmware_program, with_solver_selected
+from lapwing.cosim.optional_packages import missing
 
 if TYPE_CHECKING:
     from rich.console import Console
@@ -33,8 +35,9 @@ def campaign(
     vary: Annotated[
         list[str] | None,
         typer.Option(
-            metavar="KEY=DISTRIBUTION",
-            help="random scene key: vehicle.mass=normal(10.4,0.2), autopilot.gains=choice(a.toml,b.toml) (repeatable)",
+            metavar="KEY=DISTRIBUTION|FILE.toml",
+            help="random scene key: vehicle.mass=normal(10.4,0.2), autopilot.gains=choice(a.toml,b.toml); or all "
+            "parameters of a file of `lapwing identify`, with their correlations (repeatable)",
         ),
     ] = None,
     sweep: Annotated[
@@ -62,15 +65,22 @@ def campaign(
     shard: Annotated[
         str | None, typer.Option(metavar="I/N", help="run part I of N only, for arrays of batch jobs")
     ] = None,
+    explain: Annotated[
+        int | None,
+        typer.Option(metavar="RUN", help="SCENE is a campaign folder: find the least change with which its run fails"),
+    ] = None,
     allow_code: Annotated[bool, typer.Option("--allow-code", help="allow FMUs of the scene to run")] = False,
 ) -> None:
     """Fly a scene many times with random parameters.
 
-    Reports error distributions, the failure probability, and which parameters matter.
+    Reports how many runs fail and why, the failure probability, error distributions, and which parameters matter.
     """
     from lapwing.services.common import foreign_code
 
-    with foreign_code.permission(allow_code):
+    with foreign_code.permission(allow_code), ExitStack() as stack:
+        if explain is not None:
+            _explain(scene, explain, json)
+            return
         if workers is not None and workers < 1:
             raise ValueError(f"--workers {workers}: expected at least 1")
         if ci_half_width is not None and not 0.0 < ci_half_width < 1.0:
@@ -94,10 +104,12 @@ def campaign(
         check_firmware_program(selected)
         campaign_plan = campaign_plan._replace(overrides=tuple(selected.overrides))
 
+        from lapwing.cosim.processes.watchdog import Watchdog
         from lapwing.studies.campaign.folder import begin, default_path, manifest
-        from lapwing.studies.terminal import console
         from lapwing.studies.workers import cores
+        from lapwing.views.terminal import console
 
+        stack.enter_context(Watchdog())
         screen = console()
         first = _reference(screen, campaign_plan)
         campaign_manifest = manifest(campaign_plan, first)
@@ -112,17 +124,20 @@ def campaign(
         digest = folder.finish(csv)
 
         from lapwing.file_schemas.key_units import key_units
-        from lapwing.studies.campaign import console_output
-        from lapwing.studies.campaign.campaign_report import write
         from lapwing.studies.campaign.results import Results
+        from lapwing.views.studies.campaign_result import result
+        from lapwing.views.studies.study_result import show, write_json, write_report
 
         results = Results(folder, key_units(campaign_plan.keys))
-        console_output.show(screen, results)
+        found = result(results, digest)
+        show(screen, found)
         if json:
-            console_output.write_json(json, results, digest)
+            write_json(json, found)
         page = report or folder.path / "report.html"
-        if len(results):
-            write(page, results)
+        if len(results) and (message := missing("jinja2", "plotly", "matplotlib")):
+            screen.print(f"report  none: {message}", markup=False, soft_wrap=True)
+        elif len(results):
+            write_report(page, found)
             screen.print(f"{'report':<7} {page}", soft_wrap=True)
         screen.print(f"{'digest':<7} {digest}\n{'folder':<7} {folder.path}", soft_wrap=True)
 
@@ -134,32 +149,58 @@ def compare(
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the differences as JSON")] = None,
 ) -> None:
     """Compare two campaigns run by run, with confidence intervals."""
-    from lapwing.studies.campaign import campaign_comparison as study
-    from lapwing.studies.json_file import write_json
-    from lapwing.studies.terminal import console
+    from lapwing.studies.campaign.comparison import compare as study
+    from lapwing.views.studies.campaign_result import comparison_result
+    from lapwing.views.studies.study_result import show, write_json
+    from lapwing.views.terminal import console
 
     claim(json)
-    result = study.compare(one, other)
-    study.show(console(), result)
+    result = comparison_result(study(one, other))
+    show(console(), result)
+    if json:
+        write_json(json, result)
+
+
+def _explain(folder: Path, run: int, json: Path | None) -> None:
+    """Print the least change of the varied parameters with which a run of a campaign still fails."""
+    from lapwing.cli.progress import step_progress
+    from lapwing.studies.campaign.explanation import explain
+    from lapwing.views.studies.campaign_result import explanation_result
+    from lapwing.views.studies.study_result import show, write_json
+    from lapwing.views.terminal import console
+
+    screen = console()
+    claim(json)
+    with step_progress(screen, "flights") as progress:
+        result = explanation_result(explain(folder, run, progress))
+    show(screen, result)
     if json:
         write_json(json, result)
 
 
 def _reference(screen: "Console", campaign_plan: "Plan") -> "Reference":
     from lapwing.runs.compile_notice import notify_on_compile
-    from lapwing.studies.campaign.runs import first_setup, reference
+    from lapwing.studies.campaign.runs import first_config, reference
 
-    run, setup = first_setup(campaign_plan)
-    with notify_on_compile(setup, lambda what: screen.print(what.notice, soft_wrap=True)):
-        return reference(run, setup)
+    run, config = first_config(campaign_plan)
+    with notify_on_compile(config, lambda what: screen.print(what.notice, soft_wrap=True)):
+        return reference(run, config)
 
 
 def _distributions(vary: list[str]) -> "dict[str, Distribution]":
-    """Return the distributions of texts KEY=DISTRIBUTION by key."""
+    """Return the distributions of texts KEY=DISTRIBUTION, or of files of estimated parameters, by key."""
     from lapwing.studies.campaign.distributions import parse  # imports scipy
 
     result: dict[str, Distribution] = {}
     for text in vary:
+        if "=" not in text and text.endswith(".toml"):
+            from lapwing.studies.campaign.posterior import posterior  # imports numba
+
+            drawn = posterior(text)
+            if twice := sorted(set(drawn) & set(result)):
+                raise ValueError(f"--vary {text}: {twice[0]} already has a distribution; use one for each key")
+            result |= drawn
+            continue
         key, separator, distribution = (part.strip() for part in text.partition("="))
         if not separator or not key:
             raise ValueError(f"--vary {text}: expected KEY=DISTRIBUTION, for example vehicle.mass=normal(10.4,0.2)")

@@ -18,6 +18,7 @@ FLIGHT_FAILED = 4  # a criterion of the scene's `success.require` is not met
 @contextmanager
 def user_errors() -> Iterator[None]:
     """Print errors as one line; exit with 2 for invalid input, with 1 for a failed run or a system error."""
+    from lapwing.cosim.optional_packages import missing_in
     from lapwing.cosim.run_errors import BusError, LockStepError, RunFailed
 
     try:
@@ -36,6 +37,8 @@ def user_errors() -> Iterator[None]:
     except MemoryError:
         fail("system: not enough memory", 1)
     except ImportError as error:
+        if message := missing_in(error):
+            fail(message, USER_ERROR)
         if "failed to map segment" not in str(error):  # ld.so has no room for a native library
             raise
         fail("system: not enough memory", 1)

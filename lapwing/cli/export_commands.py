@@ -16,8 +16,8 @@ AllowCode = Annotated[bool, typer.Option("--allow-code", help="run FMUs of the s
 
 
 def _check(part: str, cpu: str) -> None:
-    from lapwing.fmi.exported_part import PARTS
-    from lapwing.fmi.machine_code import architectures
+    from lapwing.fmi.export.exported_part import PARTS
+    from lapwing.fmi.export.machine_code import architectures
 
     for option, value, choices in (("--part", part, PARTS), ("--cpu", cpu, architectures())):
         if value not in choices:
@@ -33,7 +33,7 @@ def export_library(
     allow_code: AllowCode = False,
     set_: Overrides = None,
 ) -> None:
-    """Export a part of a scene as a native library for C and C++.
+    """Export a part of a scene as a native library for C.
 
     The library has the machine code of `lapwing run` and computes the same bits. It needs neither Python nor numba.
     """
@@ -41,17 +41,15 @@ def export_library(
 
     with foreign_code.permission(allow_code):
         _check(part, cpu)
-        from lapwing.fmi.library import export_library, library_name
+        from lapwing.fmi.export.library import export_library, library_name
         from lapwing.services.scene_resolver import resolve
 
-        setup = resolve(with_solver_selected(scene, set_ or []))
+        config = resolve(with_solver_selected(scene, set_ or []))
         create_folder(out, parents=True)
-        export_library(setup, part, out, cpu)
-        name = library_name(setup, part)
+        export_library(config, part, out, cpu)
+        name = library_name(config, part)
         size = (out / f"lib/lib{name}.so").stat().st_size / 1e6
-        typer.echo(
-            f"{out}: library {name} ({size:.2f} MB), header include/{name}.h, C++ wrapper, CMake package, example"
-        )
+        typer.echo(f"{out}: library {name} ({size:.2f} MB), header include/{name}.h, CMake package, example")
 
 
 @app.command("export-fmu")
@@ -75,14 +73,14 @@ def export_fmu(
         _check_fmi(fmi)
         if out.suffix != ".fmu":
             raise ValueError(f"--out {out}: is not the name of an FMU; use a name that ends in .fmu")
-        from lapwing.fmi.fmu import export_fmu
+        from lapwing.fmi.export.fmu import export_fmu
         from lapwing.services.scene_resolver import resolve
 
         claim(out)
-        setup = resolve(with_solver_selected(scene, set_ or []))
-        result = export_fmu(setup, part, out, fmi, cpu)
+        config = resolve(with_solver_selected(scene, set_ or []))
+        result = export_fmu(config, part, out, fmi, cpu)
         ports = f"inputs {_names(result.inputs)}; outputs {_names(result.outputs)}"
-        typer.echo(f"{out}: FMI {fmi}.0, {out.stat().st_size / 1e6:.2f} MB, step {setup.interval:g} s; {ports}")
+        typer.echo(f"{out}: FMI {fmi}.0, {out.stat().st_size / 1e6:.2f} MB, step {config.interval:g} s; {ports}")
 
 
 @app.command("export-ssp")
@@ -105,7 +103,7 @@ def export_ssp(
         _check_fmi(fmi)
         if out.suffix != ".ssp":
             raise ValueError(f"--out {out}: is not the name of a package; use a name that ends in .ssp")
-        from lapwing.fmi.system_package import SSP_VERSIONS, export_system
+        from lapwing.fmi.export.system_package import SSP_VERSIONS, export_system
         from lapwing.services.scene_resolver import resolve
 
         claim(out)

@@ -1,8 +1,9 @@
 """Commands on real flights: validate, identify, import."""
 
+from collections.abc import Sequence
 from itertools import pairwise
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
@@ -10,6 +11,11 @@ from lapwing.cli.app import app
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import check_distinct, check_log, claim, claim_named
 from lapwing.cosim.complete_file import write_text
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from lapwing.flights.log_import.recording import SourceRow
 
 Flights = Annotated[
     list[Path], typer.Argument(metavar="FLIGHTS...", help="Lapwing logs (.mcap), or logs that `lapwing import` reads")
@@ -44,9 +50,11 @@ def validate(
 ) -> None:
     """Measure how well a scene's plant predicts recorded flights."""
     from lapwing.cli.progress import step_progress
-    from lapwing.studies.terminal import console
-    from lapwing.studies.validation import console_output, procedure, report_page
+    from lapwing.studies.validation import procedure
     from lapwing.studies.validation.start_states import TrimMemory
+    from lapwing.views.studies.study_result import show, write_json, write_report
+    from lapwing.views.studies.validation_result import validation_result
+    from lapwing.views.terminal import console
 
     steps = _horizons(horizons)
     _check_flights(flights, mapping)
@@ -55,12 +63,13 @@ def validate(
     claim_named("--report", report, ".html")
     with step_progress(console(), "steps") as say:
         memory = TrimMemory(trim_force, trim_torque)
-        result = procedure.validate(scene, flights, mapping, steps, set_ or [], memory, stride, closed_loop, say)
-    console_output.show(console(), result)
+        found = procedure.validate(scene, flights, mapping, steps, set_ or [], memory, stride, closed_loop, say)
+    result = validation_result(found)
+    show(console(), result)
     if json:
-        procedure.write_json(json, result)
+        write_json(json, result)
     if report:
-        report_page.write(report, result)
+        write_report(report, result)
         typer.echo(f"{report}: errors over the envelope and residual spectra")
 
 
@@ -90,9 +99,11 @@ def identify(
     An interrupted estimation resumes from FILE.progress next to the airframe file.
     """
     from lapwing.cli.progress import step_progress
-    from lapwing.studies.identification import console_output, procedure
-    from lapwing.studies.terminal import console
+    from lapwing.studies.identification import procedure
     from lapwing.studies.validation.start_states import TrimMemory
+    from lapwing.views.studies.study_result import show, write_json
+    from lapwing.views.studies.validation_result import identification_result
+    from lapwing.views.terminal import console
 
     _check_flights(flights, mapping)
     if out.suffix != ".toml":
@@ -115,11 +126,14 @@ def identify(
         result = procedure.identify(
             scene, flights, mapping, keys, memory, set_ or [], windows, seed, progress, say, horizons=steps
         )
-    console_output.show(console(), result)
+    page = identification_result(result)
+    show(console(), page)
     procedure.write_airframe(out, scene, result, set_ or [])
     typer.echo(f"{out}: the airframe; its first lines contain the values for the scene")
+    if procedure.joint_distribution(result.fit):
+        typer.echo(f"lapwing campaign {scene} --vary {out}: flies vehicles that are as uncertain as the estimates")
     if json:
-        console_output.write_json(json, result)
+        write_json(json, page)
 
 
 def _is_on_command_line(context: typer.Context, name: str) -> bool:
@@ -137,9 +151,9 @@ def _check_sensor_options(context: typer.Context) -> None:
 
 
 def _fit_sensors(flights: list[Path], mapping: str | None, out: Path) -> None:
-    from lapwing.studies.flight_import.open_flight import open_flight
+    from lapwing.cosim.scene.toml_text import dump
+    from lapwing.flights.log_import.open_flight import open_flight
     from lapwing.studies.identification.sensor_fit import fit_all
-    from lapwing.studies.toml_text import dump
 
     claim(out)
     tables, notes = fit_all([open_flight(path, mapping) for path in flights])
@@ -161,15 +175,24 @@ def import_(
     vehicle: Annotated[
         str | None, typer.Option(metavar="NAME", help="namespace of the vehicle in a rosbag2 with several")
     ] = None,
+    instance: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=N", help="instance to use of a signal of the table, or of the log's messages"),
+    ] = None,
+    twist_frame: Annotated[
+        str, typer.Option(metavar="AXES", help="axes of an odometry's twist: body, world, or none to leave it out")
+    ] = "",
 ) -> None:
-    """Convert a recorded flight from an autopilot into a log.
+    """Convert a recorded flight into a log and list its sources.
 
     Formats: ULog (.ulg), dataflash (.bin, .log), MAVLink telemetry (.tlog), rosbag2 folders and files (.mcap, .db3),
     logs of the Crazyflie's uSD deck, and CSV files (.csv, .csv.gz) with --mapping.
     """
-    from lapwing.studies.flight_import.log_flight import is_log
-    from lapwing.studies.flight_import.open_flight import open_flight
-    from lapwing.studies.flight_import.write_log import write_log
+    from lapwing.flights.log_import.log_flight import is_log
+    from lapwing.flights.log_import.open_flight import open_flight
+    from lapwing.flights.log_import.source_choice import choices_of
+    from lapwing.flights.log_import.write_log import write_log
+    from lapwing.views.terminal import console
 
     check_distinct({"FLIGHT": flight, "--out": out})
     if out.suffix != ".mcap":
@@ -178,7 +201,7 @@ def import_(
         raise ValueError(f"{flight}: is a Lapwing log already; use it without import, e.g. lapwing report {flight}")
     check_log(out)
     claim(out)
-    recording = open_flight(flight, mapping, vehicle)
+    recording = open_flight(flight, mapping, vehicle, choices_of(instance or [], twist_frame))
     _check_mapping([flight], mapping)
     if not recording.valid.any():
         raise ValueError(f"{flight}: no valid sample; check the --mapping")
@@ -190,6 +213,25 @@ def import_(
         typer.echo(note)
     if recording.unknown:
         typer.echo(f"topics without a counterpart: {', '.join(recording.unknown)}")
+    console().print(_source_table(recording.sources))
+    typer.echo("left out: number of samples; of resets and jumps, of events")
+
+
+def _source_table(rows: Sequence["SourceRow"]) -> "Table":
+    """Return the table that an import ends with, at most 80 columns wide."""
+    from rich.table import Table
+
+    from lapwing.views.terminal import COMPACT
+
+    table = Table(**COMPACT)
+    widths = {"signal": None, "source, instance": 22, "frame, datum": 10, "samples": None, "left out": None}
+    for head, width in widths.items():
+        table.add_column(head, justify="right" if head == "samples" else "left", overflow="fold", width=width)
+    for row in rows:
+        source = " ".join(filter(None, (row.source, row.instance)))
+        axes = ", ".join(filter(None, (row.frame, row.datum)))
+        table.add_row(row.signal, source or "-", axes or "-", str(row.samples), row.left_out.replace(", ", "\n"))
+    return table
 
 
 def _horizons(text: str) -> tuple[int, ...]:
@@ -211,7 +253,7 @@ def _check_flights(flights: list[Path], mapping: str | None) -> None:
 
 def _check_mapping(flights: list[Path], mapping: str | None) -> None:
     """Raise ValueError if no file uses the mapping."""
-    from lapwing.studies.flight_import.open_flight import takes_mapping
+    from lapwing.flights.log_import.open_flight import takes_mapping
 
     if mapping is not None and not any(map(takes_mapping, flights)):
         raise ValueError(UNUSED_MAPPING.format(mapping, flights[0]))

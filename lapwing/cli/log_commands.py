@@ -8,20 +8,20 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.error_exit import DIFFERENT, fail
 from lapwing.cli.options import LogFile
-from lapwing.cli.output_paths import check_distinct, check_log, claim, create_folder
+from lapwing.cli.output_paths import check_distinct, check_log, claim, claim_named, create_folder
 from lapwing.cosim.output_lock import write_errors
 
 if TYPE_CHECKING:
-    from lapwing.studies.logs.log_comparison import Comparison
-    from lapwing.studies.logs.log_info import Info
+    from lapwing.flights.logs.log_comparison import Comparison
+    from lapwing.flights.logs.log_info import Info
 
 
 @app.command()
 def info(log: LogFile) -> None:
     """Show the origin, topics, events and gaps of a log."""
     from lapwing.cli.run_summary import fleet, show_events
-    from lapwing.studies.logs.log_info import info as look
-    from lapwing.studies.terminal import console
+    from lapwing.flights.logs.log_info import info as look
+    from lapwing.views.terminal import console
 
     result = look(log)
     for label, line in _about(result).items():
@@ -54,7 +54,7 @@ def verify(
     if other is not None:
         if explain:
             raise ValueError("--explain: describes one log; leave out the second FILE")
-        from lapwing.studies.logs.log_comparison import compare
+        from lapwing.flights.logs.log_comparison import compare
 
         check_distinct({"FILE": log, "the second FILE": other})
         comparison = compare(log, other)
@@ -67,7 +67,7 @@ def verify(
     with LogReader(log) as read:
         recorded, computed, metadata = read.metadata.get("digest"), read.digest(), read.metadata
     if explain:
-        from lapwing.studies.logs.reproduction import expectation, facts
+        from lapwing.flights.logs.reproduction import expectation, facts
 
         for fact in facts(metadata):
             note = "same" if fact.recorded == fact.here else f"here {fact.here}"
@@ -107,16 +107,28 @@ def export(
     mat: Annotated[
         Path | None, typer.Option(metavar="FILE", help="write a MATLAB file with a struct for each topic")
     ] = None,
-    topics: Annotated[str | None, typer.Option(metavar="TOPIC,...", help="export only these topics")] = None,
+    ulog: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="write motion, motors, battery and setpoints as a log of PX4")
+    ] = None,
+    topics: Annotated[str | None, typer.Option(metavar="TOPIC,...", help="export only these topics as tables")] = None,
 ) -> None:
-    """Write a log as CSV, Parquet or MATLAB tables with units."""
+    """Write a log as CSV, Parquet or MATLAB tables, or as a ULog file."""
     from lapwing.cosim.log import LogReader
-    from lapwing.studies.logs import log_export as tables
+    from lapwing.flights.logs import log_export as tables
 
-    if not (parquet or csv or mat):
-        raise ValueError("export: expected --parquet FOLDER, --csv FOLDER or --mat FILE")
-    check_distinct({"FILE": log, "--parquet": parquet, "--csv": csv, "--mat": mat})
+    if not (parquet or csv or mat or ulog):
+        raise ValueError("export: expected --parquet FOLDER, --csv FOLDER, --mat FILE or --ulog FILE")
+    check_distinct({"FILE": log, "--parquet": parquet, "--csv": csv, "--mat": mat, "--ulog": ulog})
     claim(mat)
+    claim_named("--ulog", ulog, ".ulg")
+    if ulog:
+        from lapwing.flights.logs.ulog_export import write_ulog
+
+        with write_errors(ulog):
+            write_ulog(log, ulog)
+        typer.echo(ulog)
+    if not (parquet or csv or mat):
+        return
     with LogReader(log) as read:
         result = tables.tables(read, topics.split(",") if topics is not None else None)
         if not read.complete:
@@ -133,7 +145,7 @@ def export(
 
 def _about(info: "Info") -> dict[str, str]:
     """Return the header lines of `info` by label."""
-    from lapwing.studies.flight_provenance import solver_and_exchange
+    from lapwing.flights.flight_provenance import solver_and_exchange
 
     metadata = info.metadata
     count = sum(topic.messages for topic in info.topics)

@@ -116,10 +116,10 @@ def _link_servers(options: ReplayOptions, speed: float | None, stack: ExitStack)
     """Open the MAVLink links of each recorded vehicle, by its name; the first server polls for the others."""
     if not options.mavlink:
         return {}
-    from lapwing.cosim.config.provenance import SETUP_FILE
+    from lapwing.cosim.config.provenance import CONFIG_FILE
     from lapwing.cosim.diagram.multi_vehicle import members
     from lapwing.cosim.log import LogReader
-    from lapwing.runs.resimulate import recorded_setup
+    from lapwing.runs.resimulate import recorded_config
     from lapwing.services.mavlink.link_options import Options
     from lapwing.services.mavlink.link_server import LinkServer
     from lapwing.services.mavlink.links import for_vehicle_index
@@ -127,8 +127,8 @@ def _link_servers(options: ReplayOptions, speed: float | None, stack: ExitStack)
     from lapwing.services.mavlink.vehicle_description import VehicleDescription
 
     with LogReader(options.log) as reader:
-        if SETUP_FILE in reader.attachments:
-            vehicles = {m.vehicle: m.auxiliary.get("mavlink") for m in members(recorded_setup(reader))}
+        if CONFIG_FILE in reader.attachments:
+            vehicles = {m.vehicle: m.auxiliary.get("mavlink") for m in members(recorded_config(reader))}
         else:  # written by another tool
             vehicles = {next((t.split("/")[1] for t in reader.topics() if t.endswith("/status")), "drone1"): None}
     key = read_key(options.mavlink_key) if options.mavlink_key else None
@@ -177,7 +177,7 @@ def resimulate(
     from lapwing.cli.progress import RunProgress
     from lapwing.runs import resimulate as runs
     from lapwing.services.common import foreign_code
-    from lapwing.studies.terminal import console
+    from lapwing.views.terminal import console
 
     with foreign_code.permission(allow_code):
         with RunProgress(console(), 0.0) as display:

@@ -4,12 +4,12 @@ import os
 import re
 import resource
 import sys
+from contextlib import AbstractContextManager, nullcontext
 from typing import Annotated
 
 import typer
 
 from lapwing.cli import (  # noqa: F401 (they register themselves)
-    autopilot_command,
     campaign_commands,
     export_commands,
     flight_commands,
@@ -21,12 +21,12 @@ from lapwing.cli import (  # noqa: F401 (they register themselves)
     report_commands,
     run_command,
     scene_commands,
+    scene_tests,
     service_command,
     setup_commands,
-    studio_command,
     study_commands,
 )
-from lapwing.cli.app import app
+from lapwing.cli.app import GROUPS, app
 from lapwing.cli.error_exit import USER_ERROR, fail, user_errors
 from lapwing.cli.stdout_guard import check_output
 
@@ -100,11 +100,24 @@ def main() -> None:
 
         relax_gc()
         try:
-            with foreign_code.permission(False):
+            with foreign_code.permission(False), _watchdog(sys.argv[1:]):
                 app(sys.argv[1:] or ["--help"], prog_name="lapwing", standalone_mode=False)
         except UsageError as error:
             command = error.ctx.command_path if error.ctx else " ".join(["lapwing", *_command_name()])
             fail(f"{_usage_text(error)} (see {command} --help)", USER_ERROR)
+
+
+# A campaign has its own, which starts after the checks of its options: numba takes half a second to import.
+WATCHED = {*GROUPS["Study"], "check", "precompile", "resimulate", "test", "tune", "validate"}
+
+
+def _watchdog(arguments: list[str]) -> AbstractContextManager:
+    """Return a watchdog for a command that computes in compiled code; a run has its own."""
+    if arguments[:1] and arguments[0] in WATCHED and "--help" not in arguments:
+        from lapwing.cosim.processes.watchdog import Watchdog
+
+        return Watchdog()
+    return nullcontext()
 
 
 def _command_name() -> list[str]:

@@ -24,7 +24,7 @@ ModuleName = Annotated[str, typer.Argument(metavar="NAME", help="name of the mod
 
 @new.command()
 def scene(name: Annotated[str, typer.Argument(metavar="NAME", help="name of the scene, e.g. my_flight")]) -> None:
-    """Create a scene: NAME.toml, a copy of the hover scene."""
+    """Create a scene: NAME.toml, a flight over waypoints with comments."""
     typer.echo(write_scene(name, Path()))
 
 
@@ -42,16 +42,16 @@ for _kind, _noun in EXTENSIONS.items():
 
 
 def write_scene(name: str, folder: Path) -> Path:
-    """Write a copy of the hover scene and return its path. Raise ValueError for an invalid or taken name."""
-    from lapwing.services.common.run_schema import SHIPPED
+    """Write a commented scene and return its path. Raise ValueError for an invalid or taken name."""
+    from lapwing.services.common.schemas.run_schema import SHIPPED
 
     if not name.isidentifier() or (SHIPPED / f"{name}.toml").exists():
         raise ValueError(f"NAME {name}: is invalid or a shipped scene; choose another name, e.g. my_flight")
     path = folder / f"{name}.toml"
     if path.exists():
         raise ValueError(f"{path}: already exists; choose another name")
-    text = (SHIPPED / "hover.toml").read_text(encoding="utf-8")
-    path.write_text(text.partition("\n\n")[2], encoding="utf-8")  # without the comment at its head
+    text = Template((TEMPLATES / "scene.toml.template").read_text(encoding="utf-8"))
+    path.write_text(text.substitute(name=name, title=f"{name.replace('_', ' ')}: a first flight"), encoding="utf-8")
     return path
 
 

@@ -1,5 +1,6 @@
 """`lapwing new vehicle`: an interview about the measurements of a vehicle, and the airframe file from the answers."""
 
+import math
 import sys
 from collections.abc import Callable
 from pathlib import Path
@@ -8,14 +9,13 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from lapwing.cli.new_command import new
+from lapwing.cli.vehicle_measurements import FIGURES, Figure, Values, parse_settings
 from lapwing.cosim.complete_file import write_text
 from lapwing.cosim.processes.interrupt import Interrupted
 from lapwing.dynamics.config_error import ConfigError
 
 if TYPE_CHECKING:
-    from lapwing.vehicle_measurements import Figure
-
-WEAK = 1.4  # thrust-to-weight ratio below which control authority is small
+    from lapwing.dynamics.vehicles.airframe import Airframe
 
 
 @new.command()
@@ -24,81 +24,118 @@ def vehicle(
     measured: Annotated[
         list[str] | None,
         typer.Option(
-            "--set", metavar="FIGURE=VALUE", help="measured value, e.g. mass=2.0; skips its question (repeatable)"
+            "--set",
+            metavar="FIGURE=VALUE",
+            help="figure, e.g. mass=750g, diameter=7in, cells=6S, or a part, e.g. motor=kde4014xf_380 (repeatable)",
         ),
     ] = None,
 ) -> None:
     """Create an airframe: vehicles/NAME.toml, from measurements.
 
     In a terminal, the command asks for each measurement and explains it (see docs/guides/new_airframe.md). Elsewhere,
-    measurements without --set are estimated from the others and marked as estimates in the file.
+    measurements without --set are estimated from the others and marked as estimates in the file. Parts (motor,
+    propeller, cell) set several figures, from published data or a size as propeller=10x4.5.
     """
-    values = _parse_values(measured or [])
+    values = parse_settings(measured or [])
     interview = Interview(name, values) if sys.stdin.isatty() else None
     try:
-        path, remarks = write_vehicle(name, values, Path(), interview.ask if interview else None)
+        path, lift, remarks = write_vehicle(name, values, Path(), interview.ask if interview else None)
     except (ValueError, Interrupted):
         if interview:
             interview.print_answers()
         raise
     typer.echo(path)
+    typer.echo(lift)
     for remark in remarks:
         typer.echo(f"lapwing: warning: {remark}", err=True)
     airframe_option = f"--set vehicle.airframe={path.resolve()}"
     typer.echo(
         f"next: lapwing performance {path}; lapwing tune excitation {airframe_option} --out gains.toml; "
-        f"lapwing run hover {airframe_option} --set autopilot.gains={Path('gains.toml').resolve()}"
+        f"lapwing run delivery_mission {airframe_option} --set autopilot.gains={Path('gains.toml').resolve()}"
     )
 
 
 def write_vehicle(
-    name: str, measured: dict[str, float], folder: Path, ask: Callable[["Figure", float], float | None] | None = None
-) -> tuple[Path, list[str]]:
-    """Write an airframe. Return its path, and warnings about it.
+    name: str, measured: Values, folder: Path, ask: Callable[[Figure, float], float | None] | None = None
+) -> tuple[Path, str, list[str]]:
+    """Write an airframe. Return its path, a line about its thrust over weight, and warnings.
 
     Args:
         name: name of the vehicle.
-        measured: values of `lapwing.vehicle_measurements.FIGURES` by name.
+        measured: values of `lapwing.cli.vehicle_measurements.FIGURES` by name.
         folder: folder that contains `vehicles`.
-        ask: (figure, guess) -> measured value, None to accept the guess; without `ask`, all guesses are accepted.
+        ask: (figure, estimate) -> measured value, None to accept the estimate; without `ask`, all are accepted.
 
     Raises:
         ValueError: an invalid or used name, an impossible value, or a vehicle that cannot hover.
     """
-    from lapwing.airframe_writer import airframe_of, airframe_text
-    from lapwing.dynamics.vehicles.performance import thrust_over_weight
-    from lapwing.services.common.run_schema import SHIPPED
-    from lapwing.vehicle_measurements import FIGURES
+    from lapwing.cli.airframe_writer import airframe_of, airframe_text
+    from lapwing.cli.vehicle_estimates import WEAK, estimate
+    from lapwing.dynamics.constants import STANDARD_GRAVITY
+    from lapwing.dynamics.vehicles.performance import limited_thrust
+    from lapwing.services.common.schemas.run_schema import SHIPPED
 
     if not name.isidentifier() or name != name.lower():
         raise ValueError(f"NAME {name}: expected a name in small letters, for example my_quad")
     path = folder / "vehicles" / f"{name}.toml"
     if path.exists() or (SHIPPED / "vehicles" / f"{name}.toml").exists():
         raise ValueError(f"NAME {name}: a vehicle has this name; choose another")
-    values: dict[str, float] = {}
-    own = set(measured)
+    known, earlier = dict(measured), dict[str, float]()
     remarks: list[str] = []
-    for figure in FIGURES:
-        guess = figure.guess(values)
-        if figure.name in measured:
-            value: float | None = measured[figure.name]
-            remarks += filter(None, [figure.plausibility_question(measured[figure.name], guess)])
-        elif (value := ask(figure, guess) if ask else None) is not None:
-            own.add(figure.name)
-        values[figure.name] = guess if value is None else value
-        figure.check(values[figure.name])
     try:
-        thrust_to_weight = thrust_over_weight(airframe_of(values))
-        if thrust_to_weight <= 1.0:
-            raise ValueError(
-                f"{name} cannot hover: its thrust is {thrust_to_weight:.2f} times its weight; expected more than 1"
+        for figure in FIGURES:
+            if ask and figure.name not in known:
+                value = ask(figure, estimate(known)[figure.name])
+                known |= {} if value is None else {figure.name: value}
+            elif figure.name in known:
+                figure.check(known[figure.name])
+                remarks += filter(
+                    None, [figure.plausibility_question(known[figure.name], estimate(earlier)[figure.name])]
+                )
+            earlier |= {figure.name: known[figure.name]} if figure.name in known else {}
+        values = estimate(known)
+        remarks += filter(None, [_overlap(values)])
+        frame = airframe_of(values)
+        try:
+            thrust, limit = limited_thrust(frame)
+        except ValueError as error:
+            electrics = ("no_load_current", "resistance", "esc_current", "peak_current", "c_rating", "speed_constant")
+            raise ConfigError(
+                f"--set {next((name for name in electrics if name in known), 'mass')}", str(error)
+            ) from None
+        ratio, (reason, causes) = thrust / (values["mass"] * STANDARD_GRAVITY), _limit(frame, limit)
+        if ratio <= 1.0:
+            cause = next((cause for cause in causes if cause in known), "mass")
+            expected = f"more lift by {', '.join(causes)}, or less mass"
+            raise ConfigError(
+                f"--set {cause}", f"the thrust is {ratio:.2f} times the weight, limited by {reason}", expected
             )
     except ValueError as error:  # a remark about a unit may name the cause
         raise ValueError("; ".join([str(error), *remarks])) from None
     path.parent.mkdir(exist_ok=True)
-    write_text(path, airframe_text(name, values, own))
-    warning = f"its thrust is {thrust_to_weight:.2f} times its weight; control authority is small below {WEAK:g}"
-    return path, [*remarks, warning] if thrust_to_weight < WEAK else remarks
+    write_text(path, airframe_text(name, values, set(known)))
+    lift = f"thrust over weight {ratio:.2f}, limited by {reason} ({', '.join(causes)})"
+    warning = f"its thrust is {ratio:.2f} times its weight; control authority is small below {WEAK:g}"
+    return path, lift, [*remarks, warning] if ratio < WEAK else remarks
+
+
+def _limit(frame: "Airframe", limit: str) -> tuple[str, list[str]]:
+    """Return what limits the thrust, and the figures that raise the limit."""
+    motor, pack = frame.motor, frame.battery
+    if limit == "voltage":
+        return f"the {motor.max_voltage:.3g} V of the battery", ["speed_constant", "cells", "diameter"]
+    if frame.motor_current_limit < motor.current_limit and pack:
+        return f"the {pack.current_limit:.3g} A of the battery", ["capacity", "c_rating"]
+    figure = "esc_current" if motor.current_limit == motor.esc_current else "peak_current"
+    return f"the {motor.current_limit:.3g} A of the {'controller' if figure == 'esc_current' else 'motor'}", [figure]
+
+
+def _overlap(v: Values) -> str:
+    """Return a warning about propellers that overlap; "" if they do not."""
+    apart = 2.0 * v["arm"] * math.sin(math.pi / v["rotors"])
+    if v["diameter"] <= apart:
+        return ""
+    return f"diameter = {v['diameter']:.3g} m: the propellers overlap, their hubs are {apart:.3g} m apart"
 
 
 class Interview:
@@ -107,24 +144,19 @@ class Interview:
     def __init__(self, name: str, values: dict[str, float]):
         self._name, self._answers, self._started = name, dict(values), False
 
-    def ask(self, figure: "Figure", guess: float) -> float | None:
+    def ask(self, figure: Figure, guess: float) -> float | None:
         """Return the measured value of a figure, or None to accept the guess.
 
         Raises:
             ValueError: no user answers.
         """
         if not self._started:
-            typer.echo("Enter accepts the value in brackets, an estimate from the previous answers; Ctrl-C ends.")
+            typer.echo("Enter leaves a value to an estimate that fits all answers, as in brackets so far; Ctrl-C ends.")
             self._started = True
         typer.echo(f"\n{figure.how}")
         while text := _answer(f"{figure.name}, {figure.unit} [{guess:.4g}]: "):
             try:
-                value = float(text)
-            except ValueError:
-                typer.echo(f"{figure.name}: expected a number in {figure.unit} alone, as {guess:.4g}, got {text!r}")
-                continue
-            try:
-                figure.check(value)
+                value = figure.parse(text)
             except ValueError as error:
                 typer.echo(error)
                 continue
@@ -146,19 +178,3 @@ def _answer(question: str) -> str:
         return input(question).strip()
     except EOFError:
         raise ValueError("standard input has ended; run the interview in a terminal") from None
-
-
-def _parse_values(measured: list[str]) -> dict[str, float]:
-    """Return figures by name from texts FIGURE=VALUE."""
-    from lapwing.vehicle_measurements import FIGURES
-
-    names, result = [figure.name for figure in FIGURES], {}
-    for text in measured:
-        name, _, value = (part.strip() for part in text.partition("="))
-        if name not in names:
-            raise ConfigError.unknown(f"--set {text}", "figure", name, names)
-        try:
-            result[name] = float(value)
-        except ValueError:
-            raise ConfigError(f"--set {text}", f"got {value!r}", "a number") from None
-    return result

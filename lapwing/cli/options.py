@@ -16,10 +16,7 @@ Overrides = Annotated[
     typer.Option("--set", metavar="KEY=VALUE", help="override a scene key, e.g. solver.step=0.001 (repeatable)"),
 ]
 KeyPrefix = Annotated[str, typer.Option(metavar="NAME", help="prefix of the run's Zenoh keys")]
-Speed = Annotated[
-    str | None,
-    typer.Option(metavar="1|N|max", help="simulated seconds per second; max: unlimited"),
-]
+Speed = Annotated[str | None, typer.Option(metavar="1|N|max", help="simulated seconds per second; max: unlimited")]
 Keys = Annotated[
     Path | None,
     typer.Option(metavar="FOLDER", help="folder made by `lapwing certificates`, for endpoints tls/HOST:PORT"),

@@ -88,10 +88,12 @@ def claim_report(option: str, path: Path | None, log: Path | None = None) -> Non
     if path is not None and log is not None and is_locked(path):  # the other run has not opened its log yet
         raise ValueError(f"{log}: another process is writing it, or its report; choose another name, or wait for it")
     if path is not None:
-        from lapwing.studies.report import check_format
+        from lapwing.views.report.write import check_format, unavailable
 
         try:
             check_format(path)
+            if log is None and (message := unavailable(path.suffix)):  # a run leaves the one next to its log out
+                raise ValueError(message)
         except ValueError as error:
             raise ValueError(f"{option} {error}") from None
     claim(path)

@@ -1,6 +1,6 @@
 """Missions from files: `--plan FILE`, or `--plan NAME=FILE` for a vehicle of a scene with several vehicles."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,7 +15,7 @@ def overrides(plans: list[str], scene: Path, set_: list[str]) -> list[str]:
         ValueError: a plan without the name of a vehicle, or with an unknown name.
         SceneError: the scene is invalid.
     """
-    from lapwing.services.common.flight_plan_file import OPERATED
+    from lapwing.services.common.plans.plan_file import OPERATED
     from lapwing.services.scene_resolver import load
 
     if not plans:
@@ -28,17 +28,26 @@ def overrides(plans: list[str], scene: Path, set_: list[str]) -> list[str]:
     return [f"vehicle.{names.index(name)}.{text}" for name in files(plans, base) for text in OPERATED]
 
 
-def commands(plans: list[str], loaded: "Scene") -> Mapping[str, tuple[Any, ...]]:
-    """Return the commands of each vehicle that flies a plan, by name. See `overrides` for errors."""
-    from lapwing.services.common.environment_schema import environment
-    from lapwing.services.common.flight_plan_file import read
-    from lapwing.services.common.vehicle_schema import start_height
+def commands(
+    plans: list[str], loaded: "Scene", report: Callable[[str], None] = lambda line: None
+) -> Mapping[str, tuple[Any, ...]]:
+    """Return the commands of each vehicle that flies a plan, by name. See `overrides` for errors.
+
+    Args:
+        plans: values of --plan.
+        loaded: the scene.
+        report: called with a line for each kind of items that are skipped, or flown in another way.
+    """
+    from lapwing.services.common.plans.plan_file import read, site_of
 
     scenes = {scene.lookup("vehicle.name"): scene for scene in loaded.each_vehicle}
-    return {
-        name: tuple(read(path, start_height(scenes[name]), environment(scenes[name]).home))
-        for name, path in files(plans, loaded).items()
-    }
+    result = {}
+    for name, path in files(plans, loaded).items():
+        plan = read(path, site_of(scenes[name]))
+        for note in plan.notes:
+            report(f"{path}: {note}")
+        result[name] = plan.commands
+    return result
 
 
 def files(plans: list[str], loaded: "Scene") -> dict[str, Path]:

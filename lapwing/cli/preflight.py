@@ -6,15 +6,17 @@ from typing import TYPE_CHECKING
 
 import typer
 
+MANY_PARTS = 8  # of a step, from which the cause is printed
+
 if TYPE_CHECKING:
     from lapwing.cosim.scene import Scene
 
 
 def with_solver_selected(path: Path, overrides: list[str]) -> "Scene":
     """Load a scene; if it sets `solver.accuracy`, select integrator and step."""
+    from lapwing.flights.metrics import check_success
     from lapwing.services.plant.schema import accuracy_to_select_for
     from lapwing.services.scene_resolver import load
-    from lapwing.studies.metrics import check_success
 
     scene = load(path, overrides)
     for vehicle in scene.each_vehicle:
@@ -29,14 +31,22 @@ def with_solver_selected(path: Path, overrides: list[str]) -> "Scene":
     return load(path, [*overrides, *chosen])
 
 
-def warn_of_gains(scene: "Scene") -> None:
-    """Print a warning for each unstable control loop."""
+def check_gains(scene: "Scene", force: bool) -> None:
+    """Print a line for each axis of each vehicle whose gains make a control loop unstable in hover.
+
+    Raises:
+        ValueError: there is such an axis; with `force`, the lines are warnings.
+    """
     from lapwing.services.autopilot.stability_check import unstable_loops
 
+    lines = []
     for vehicle in scene.each_vehicle:
         prefix = f"{vehicle.lookup('vehicle.name')}: " if scene.vehicles else ""
-        for line in unstable_loops(vehicle):
-            typer.echo(f"lapwing: warning: {prefix}{line}", err=True)
+        lines += [f"{prefix}{line}" for line in unstable_loops(vehicle)]
+    for line in lines:
+        typer.echo(f"lapwing: {'warning: ' if force else ''}{line}", err=True)
+    if lines and not force:
+        raise ValueError("autopilot.gains: unstable in hover; design others with lapwing tune, or use --force")
 
 
 def warn_of_round_off(scene: "Scene") -> None:
@@ -48,6 +58,24 @@ def warn_of_round_off(scene: "Scene") -> None:
             (name, least), accuracy = limit, vehicle[Solver].accuracy
             message = f"substeps of {name} are limited by round-off, and {accuracy:g} may be missed in contact"
             typer.echo(f"lapwing: warning: solver.accuracy: {message}; use at least {least:g}", err=True)
+
+
+def warn_of_split_steps(scene: "Scene") -> None:
+    """Print a warning for each vehicle whose steps are split into many parts, with the cause."""
+    from lapwing.dynamics.vehicles.step_bound import FASTEST_RATE, causes
+    from lapwing.services.common.schemas.vehicle_schema import Vehicle
+    from lapwing.services.plant import models
+    from lapwing.services.plant.schema import method
+
+    for vehicle in scene.each_vehicle:
+        model = models.get(vehicle[Vehicle].model)
+        if not hasattr(model, "describe"):
+            continue
+        form, p = model.describe(vehicle)
+        fastest, step = causes(p, form.initial_state(p).memory)[0], method(vehicle)[2]
+        if (number := fastest.rate * step / FASTEST_RATE) > MANY_PARTS:
+            message = f"{fastest.name} (decay within {1e3 / fastest.rate:.2g} ms) split each step of {1e3 * step:g} ms"
+            typer.echo(f"lapwing: warning: solver: {message} into {number:.0f}, which costs most of the time", err=True)
 
 
 def check_firmware_program(scene: "Scene") -> None:

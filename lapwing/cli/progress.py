@@ -112,13 +112,7 @@ class StudyProgress(_TerminalBar):
     """Progress display with the number of finished flights of a study, and its remaining time."""
 
     def __init__(
-        self,
-        console: Console,
-        unit: str,
-        parallel: int = 0,
-        every: float = 0.0,
-        most: bool = False,
-        before: int = 0,
+        self, console: Console, unit: str, parallel: int = 0, every: float = 0.0, most: bool = False, before: int = 0
     ):
         """Create the display.
 

@@ -35,12 +35,12 @@ def protocol(
     check_distinct({"SCENE": scene, "--json": json, "--plot": plot})
     claim(json)
     claim_plot(plot)
-    setup = resolve(with_solver_selected(scene, set_ or []))
-    result = layout(setup)
+    config = resolve(with_solver_selected(scene, set_ or []))
+    result = layout(config)
     if plot:
-        from lapwing.studies.service_diagram import draw
+        from lapwing.views.service_diagram import draw
 
-        draw(setup, plot)
+        draw(config, plot)
     if json:
         write_text(json, json_module.dumps(result, indent=1) + "\n")
     if json or plot:

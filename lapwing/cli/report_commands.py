@@ -1,4 +1,4 @@
-"""Reports, views and videos of logs."""
+"""Reports, views and videos of logs, and the local page `lapwing studio`."""
 
 from functools import partial
 from pathlib import Path
@@ -25,9 +25,9 @@ def report(
     ] = None,
 ) -> None:
     """Write a report of a log, or a comparison of two logs."""
+    from lapwing.api.flight import Flight
     from lapwing.cli.output_paths import check_distinct, claim_report
-    from lapwing.flight import Flight
-    from lapwing.studies.flight_data import SHOWN
+    from lapwing.flights.flight_data import SHOWN
 
     check_distinct({"FILE": log, "the second FILE": other, "--out": out})
     claim_report("--out", out or log.with_suffix(".html"))
@@ -50,9 +50,9 @@ def view(
     """Write the report of a log and open it in the browser."""
     import webbrowser
 
-    from lapwing.flight import Flight
-    from lapwing.rerun import open_in_rerun
-    from lapwing.studies.flight_data import SHOWN
+    from lapwing.api.flight import Flight
+    from lapwing.flights.flight_data import SHOWN
+    from lapwing.views.rerun_export import open_in_rerun
 
     if rerun:
         open_in_rerun(log)
@@ -83,14 +83,14 @@ def render(
 
     Needs chromium, and pip install lapwing[view3d].
     """
+    from lapwing.api.flight import Flight
     from lapwing.cli.output_paths import check_distinct, claim
     from lapwing.cli.progress import step_progress
-    from lapwing.flight import Flight
-    from lapwing.studies.flight_data import SHOWN
-    from lapwing.studies.report.sections import labels
-    from lapwing.studies.terminal import console
-    from lapwing.studies.view3d.render import Shot, check
-    from lapwing.studies.view3d.render import render as draw
+    from lapwing.flights.flight_data import SHOWN
+    from lapwing.views.report.sections import labels
+    from lapwing.views.terminal import console
+    from lapwing.views.view3d.render import Shot, check
+    from lapwing.views.view3d.render import render as draw
 
     shot = Shot(start, stop, fps, speed, camera, _size(size))
     check(out, shot)
@@ -100,6 +100,19 @@ def render(
     with step_progress(console(), "pictures", parallel=1) as say:
         draw(flights, labels(flights), out, shot, partial(say, ""))
     typer.echo(out)
+
+
+@app.command()
+def studio(
+    port: Annotated[int, typer.Option(metavar="N", min=0, max=65535, help="TCP port on 127.0.0.1; 0: any free")] = 0,
+) -> None:
+    """Pick, change, fly and compare scenes on a local web page.
+
+    Serves on this machine only, until Ctrl-C. Needs pip install lapwing[studio].
+    """
+    from lapwing.views.studio.server import serve
+
+    serve(port, typer.echo)
 
 
 def _names(text: str | None, other: Path | None) -> list[str]:

@@ -12,22 +12,22 @@ import typer
 from lapwing.cli import plan_options
 from lapwing.cli.app import app
 from lapwing.cli.options import absolute, check_pace, parse_speed, with_options
-from lapwing.cli.output_paths import (
-    check_distinct,
-    check_log,
-    claim,
-    claim_report,
-    remove_on_failure,
-    reserve_log,
+from lapwing.cli.output_paths import check_distinct, check_log, claim, claim_report, remove_on_failure, reserve_log
+from lapwing.cli.preflight import (
+    check_firmware_program,
+    check_gains,
+    warn_of_round_off,
+    warn_of_split_steps,
+    with_solver_selected,
 )
-from lapwing.cli.preflight import check_firmware_program, warn_of_gains, warn_of_round_off, with_solver_selected
 from lapwing.cli.run_options import MULTI_PROCESS, SINGLE_PROCESS, RunOptions
+from lapwing.cosim.optional_packages import require
 from lapwing.cosim.output_lock import modification_time
-from lapwing.cosim.processes.child_process import Child, start_early
+from lapwing.cosim.processes.child_process import Child, start_early, terminate_unused
 
 if TYPE_CHECKING:
+    from lapwing.api.flight import Flight
     from lapwing.cosim.scene import Scene
-    from lapwing.flight import Flight
     from lapwing.runs.observer import Elapsed
     from lapwing.services.process_main import ProcessSpec
 
@@ -41,15 +41,13 @@ def run(options: RunOptions) -> None:
     """
     from lapwing.services.common import foreign_code
 
+    if options.mavlink:
+        require("pymavlink")
     with foreign_code.permission(options.allow_code), _start_early(options) as early:
         options.validate()
-        scene = _load(options)
-        options = _with_ros2_of_scene(options, scene)
-        if not options.external:
-            check_firmware_program(scene)
-        warn_of_gains(scene)
-        warn_of_round_off(scene)
-        spec = _spec(options, scene)
+        scene, options, spec = _prepare(options)
+        if options.mode == SINGLE_PROCESS:
+            terminate_unused(early)
         flights = _fly_and_report(options, scene, spec, early)
         if flights:
             from lapwing.cli import run_summary  # imported after the flight, whose start it would delay
@@ -58,10 +56,27 @@ def run(options: RunOptions) -> None:
             run_summary.check_success(scene, flights)
 
 
+def _prepare(options: RunOptions) -> "tuple[Scene, RunOptions, ProcessSpec]":
+    """Return the scene, the options with those that it sets, and the specification of the run."""
+    from lapwing.cosim.processes.watchdog import Watchdog
+    from lapwing.services.common.firmware.schema import flown_by_firmware
+
+    with Watchdog():  # user code is tried
+        scene = _load(options)
+        options = _with_ros2_of_scene(options, scene)
+        options = replace(options, mode=options.mode_of(any(map(flown_by_firmware, scene.each_vehicle))))
+        if not options.external:
+            check_firmware_program(scene)
+        check_gains(scene, options.force)
+        warn_of_round_off(scene)
+        warn_of_split_steps(scene)
+        return scene, options, _spec(options, scene)
+
+
 @contextmanager
 def _start_early(options: RunOptions) -> Iterator[dict[str, Child]]:
     """Start the processes of a run before the scene is read, so that they import their modules at the same time."""
-    if options.mode != MULTI_PROCESS or options.endpoints is not None:
+    if options.mode == SINGLE_PROCESS or options.endpoints is not None:
         yield {}
         return
     from lapwing.services.process_main import import_ahead
@@ -82,6 +97,8 @@ def _start_early(options: RunOptions) -> Iterator[dict[str, Child]]:
 def _load(options: RunOptions) -> "Scene":
     """Return the scene with the overrides of --set, --plan, --mavlink and --run."""
     overrides = list(options.set_ or [])
+    if options.firmware_schedule is not None:
+        overrides.append(f"autopilot.schedule={options.firmware_schedule}")
     if options.plan:
         overrides += plan_options.overrides(options.plan, options.scene, overrides)
     elif options.mavlink:
@@ -111,24 +128,24 @@ def _spec(options: RunOptions, scene: "Scene") -> "ProcessSpec":
     from lapwing.cosim.processes.run_monitor import MONITOR
     from lapwing.runs.distributed_run import check_complete, external_services, parse_external
     from lapwing.services.common import foreign_code
-    from lapwing.services.common.run_schema import Run
+    from lapwing.services.common.schemas.run_schema import Run
     from lapwing.services.process_main import ProcessSpec
     from lapwing.services.process_table import foreign_firmware, required_processes
     from lapwing.services.scene_resolver import resolve
 
-    setup = resolve(scene, plan_options.commands(options.plan or [], scene))
-    if options.mavlink and (firmware := foreign_firmware(setup)):
+    config = resolve(scene, plan_options.commands(options.plan or [], scene, _print_note))
+    if options.mavlink and (firmware := foreign_firmware(config)):
         message = f"--mavlink: {firmware} flies the vehicle and has its own MAVLink or MSP links"
         raise ValueError(f"{message}; connect the ground station to the firmware")
-    foreign_code.check(setup)
+    foreign_code.check(config)
     speed, table, realtime = parse_speed(options.speed), options.table, options.realtime
     if options.speed is None:
         paced = options.mavlink or options.view or realtime or options.ros2 is not None
         speed = scene[Run].real_time_factor or (1.0 if paced else None)
     source = f"run.real_time_factor {speed}" if options.speed is None else f"--speed {options.speed}"
-    check_pace(source, speed, setup.interval)
+    check_pace(source, speed, config.interval)
     if table is not None:
-        check_complete(table, [*required_processes(setup, external_services(table)), MONITOR])
+        check_complete(table, [*required_processes(config, external_services(table)), MONITOR])
     log = options.log or reserve_log(scene.name)
     if not log.name:
         raise ValueError(f"--log {log}: is a folder; expected the path of an output file")
@@ -143,36 +160,49 @@ def _spec(options: RunOptions, scene: "Scene") -> "ProcessSpec":
         typer.echo(f"lapwing: --realtime: no real-time class: {reason}", err=True)
     return ProcessSpec(
         name=MONITOR,
-        setup=setup,
+        config=config,
         peers=table or {},
         key_prefix=options.key_prefix,
         speed=speed,
         log=absolute(log),
         sources={name: content.decode() for name, content in scene.sources.items()},
-        mode=options.mode,
+        mode=options.mode or MULTI_PROCESS,
         open=(options.listen,) if options.listen else (),
-        external=external_services(table) if table else parse_external(options.external or [], setup),
+        external=external_services(table) if table else parse_external(options.external or [], config),
         keys=absolute(options.keys),
         realtime=realtime,
         **options.spec,
     )
 
 
+def _print_note(line: str) -> None:
+    typer.echo(f"lapwing: {line}", err=True)
+
+
 def _fly_and_report(
     options: RunOptions, scene: "Scene", spec: "ProcessSpec", early: dict[str, Child]
 ) -> "list[Flight]":
-    """Fly and return the recorded flights. A failed or interrupted run is reported before its error."""
+    """Fly and return the recorded flights. A failed or interrupted run is reported before its error.
+
+    A run that its user ends after all vehicles have landed is complete.
+    """
+    from lapwing.cosim.config.provenance import ENDED
+    from lapwing.cosim.processes.interrupt import Interrupted
+    from lapwing.cosim.run_errors import RunFailed
+
     log = Path(spec.log) if options.log is None else options.log
     before = modification_time(log)
 
-    def report(elapsed: "Elapsed | None") -> "list[Flight]":
+    def report(elapsed: "Elapsed | None", reason: str = "") -> "list[Flight]":
         from lapwing.cli import run_summary
-        from lapwing.runs.log_events import add_events
+        from lapwing.flights.log_events import add_events
 
         if elapsed is None and modification_time(log) == before:
             return []
         flights = run_summary.fleet(log)
         for flight in flights:
+            if reason and flight.failure in ("", ENDED):  # a process that has died cannot say so in the log
+                flight.failure = reason
             if flight.digest and not flight.has("events"):  # the log is complete
                 add_events(log, flight)
         if flights:
@@ -181,11 +211,14 @@ def _fly_and_report(
 
     try:
         elapsed = _fly(options, spec, log, early)
-    except BaseException:
+    except BaseException as error:
+        flights: list[Flight] = []
         with suppress(ValueError):  # the first error is reported
-            report(None)
+            flights = report(None, str(error) if isinstance(error, RunFailed) else "")
         if modification_time(log) != before:
             _advise_recovery(log)
+        if isinstance(error, Interrupted) and flights and all(flight.landed for flight in flights):
+            return flights
         raise
     return report(elapsed)
 
@@ -201,14 +234,14 @@ def _advise_recovery(log: Path) -> None:
 def _fly(options: RunOptions, spec: "ProcessSpec", log: Path, early: dict[str, Child]) -> "Elapsed":
     from lapwing.cli.progress import RunProgress
     from lapwing.services.process_table import FOXGLOVE, MAVLINK, ROS2
-    from lapwing.studies.terminal import console
+    from lapwing.views.terminal import console
 
-    setup = spec.setup
-    with remove_on_failure(log), RunProgress(console(), setup.duration) as display, ExitStack() as stack:
+    config = spec.config
+    with remove_on_failure(log), RunProgress(console(), config.duration) as display, ExitStack() as stack:
         if spec.mode == SINGLE_PROCESS:
             from lapwing.runs.single_process_run import fly_single
 
-            return fly_single(setup, log, spec.sources, spec.speed, display)
+            return fly_single(config, log, spec.sources, spec.speed, display)
         links = {MAVLINK: spec.mavlink, FOXGLOVE: spec.foxglove, ROS2: spec.ros2 is not None}
         auxiliary = [name for name, requested in links.items() if requested or name in spec.peers]
         fly: Callable[..., Elapsed]
@@ -224,14 +257,14 @@ def _fly(options: RunOptions, spec: "ProcessSpec", log: Path, early: dict[str, C
         if options.view:
             import webbrowser
 
-            from lapwing.runs.live_page import LivePage
+            from lapwing.views.live.live_page import LivePage
 
-            page = stack.enter_context(LivePage(setup))
+            page = stack.enter_context(LivePage(config))
             display.say(f"live: {page.address}")
             webbrowser.open(page.address)
             displays.append(page.show)
         if not (displays or FOXGLOVE in auxiliary or ROS2 in auxiliary):
             return fly()
-        from lapwing.runs.live_feed import LiveFeed
+        from lapwing.views.live.live_feed import LiveFeed
 
-        return fly(live=LiveFeed(setup, displays).observe)
+        return fly(live=LiveFeed(config, displays).observe)

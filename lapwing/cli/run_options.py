@@ -35,8 +35,12 @@ class RunOptions(LinkOptions):
         bool, typer.Option("--realtime", help="fly at speed 1, in the real-time scheduling class where permitted")
     ] = False
     mode: Annotated[
-        str, typer.Option(metavar="multi-process|single-process", help="a process for each service, or one for all")
-    ] = MULTI_PROCESS
+        str | None,
+        typer.Option(
+            metavar="multi-process|single-process",
+            help="a process for each service, or one for all [single-process if a firmware flies]",
+        ),
+    ] = None
     log: Annotated[Path | None, typer.Option(metavar="FILE", help="MCAP log [recordings/SCENE_TIME.mcap]")] = None
     report: Annotated[Path | None, typer.Option(metavar="FILE.html|pdf|png", help="report [.html next to log]")] = None
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the results as JSON")] = None
@@ -55,6 +59,10 @@ class RunOptions(LinkOptions):
         typer.Option(metavar="NAME=ENDPOINT", help="service run by your own program, at this endpoint (repeatable)"),
     ] = None
     keys: Keys = None
+    firmware_schedule: Annotated[
+        int | None, typer.Option(metavar="SEED", help="order of the firmware's threads [autopilot.schedule]")
+    ] = None
+    force: Annotated[bool, typer.Option("--force", help="fly even if the gains make a loop unstable in hover")] = False
     allow_code: Annotated[bool, typer.Option("--allow-code", help="allow FMUs of the scene to run")] = False
 
     @property
@@ -82,7 +90,7 @@ class RunOptions(LinkOptions):
         check_external(self.external or [], self.insecure)
         self.validate_links()
         if self.view:
-            from lapwing.studies.view3d import available
+            from lapwing.views.view3d import available
 
             if not available():
                 raise ValueError("--view: viser is not installed; pip install lapwing[view3d]")
@@ -91,11 +99,18 @@ class RunOptions(LinkOptions):
 
     def validate_mode(self) -> None:
         """Raise ValueError for an unknown mode, and for options that the mode does not support."""
-        if self.mode not in (MULTI_PROCESS, SINGLE_PROCESS):
+        if self.mode not in (None, MULTI_PROCESS, SINGLE_PROCESS):
             raise ValueError(f"--mode {self.mode}: expected {MULTI_PROCESS} or {SINGLE_PROCESS}")
         single, distributed = self.mode == SINGLE_PROCESS, self.endpoints is not None
         if single and (distributed or self.listen is not None):
             raise ValueError(f"--mode {SINGLE_PROCESS}: has no network; leave out --endpoints and --listen")
+        for option in self._for_processes:
+            if single or (distributed and option != "--view"):
+                raise ValueError(f"{option}: needs --mode {MULTI_PROCESS}; {ALTERNATIVES[option]}")
+
+    @property
+    def _for_processes(self) -> list[str]:
+        """Return the given options that need a process for each service, without those of the network."""
         requested = {
             "--mavlink": self.mavlink,
             "--external": self.external,
@@ -104,6 +119,9 @@ class RunOptions(LinkOptions):
             "--realtime": self.realtime,
             "--ros2": self.ros2 is not None,
         }
-        for option, value in requested.items():
-            if value and (single or (distributed and option != "--view")):
-                raise ValueError(f"{option}: needs --mode {MULTI_PROCESS}; {ALTERNATIVES[option]}")
+        return [option for option, value in requested.items() if value]
+
+    def mode_of(self, firmware: bool) -> str:
+        """Return the mode; by default one process if a firmware flies, because that is several times faster."""
+        processes = self._for_processes or self.listen is not None or self.endpoints is not None
+        return self.mode or (SINGLE_PROCESS if firmware and not processes else MULTI_PROCESS)

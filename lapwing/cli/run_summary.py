@@ -9,25 +9,26 @@ import typer
 from rich.console import Console
 from rich.table import Table
 
+from lapwing.api.flight import Flight
 from lapwing.cli.error_exit import FLIGHT_FAILED, fail
 from lapwing.cli.run_options import RunOptions
 from lapwing.cosim.scene import Scene
-from lapwing.flight import Flight
-from lapwing.services.common.run_schema import Published
-from lapwing.services.common.success_criteria import Success
-from lapwing.studies import terminal
-from lapwing.studies.flight_data import SHOWN
+from lapwing.flights.flight_data import SHOWN
+from lapwing.flights.metrics import joint_end_state, metrics
+from lapwing.flights.separation import Separation, nearest
+from lapwing.flights.tracking import unit_and_factor
+from lapwing.services.common.schemas.run_schema import Published
+from lapwing.services.common.schemas.success_criteria import Success
 from lapwing.studies.json_file import write_json
-from lapwing.studies.metrics import joint_end_state, metrics
-from lapwing.studies.separation import Separation, nearest
-from lapwing.studies.tracking import unit_and_factor
+from lapwing.views import terminal
+from lapwing.views.report.write import unavailable
 
 if TYPE_CHECKING:
     from lapwing.runs.observer import Elapsed
     from lapwing.services.process_main import ProcessSpec
 
 MAX_EVENTS = 60  # limit of the printed events
-COLOURS = {"landed": "green", "completed": "green", "landed elsewhere": "yellow", "timed out": "yellow"}  # default: red
+COLOURS = {"good": "green", "warn": "yellow", "bad": "red"}  # by the mark of an outcome
 
 
 def fleet(log: Path) -> list[Flight]:
@@ -57,9 +58,10 @@ def report_results(
         report: path of the report; None for the path of the log with another extension.
     """
     first, several = flights[0], bool(scene.vehicles)
+    lacking = unavailable() if report is None else ""
     result = {
         "scene": scene.name,
-        "seed": spec.setup.seed,
+        "seed": spec.config.seed,
         "mode": spec.mode,
         "digest": first.digest,
         **(_of_fleet(flights) if several else _of_vehicle(first)),
@@ -68,7 +70,7 @@ def report_results(
         "real_time_factor": (elapsed.simulated / elapsed.wall if elapsed.wall else 0.0) if elapsed else None,
         "firmware": [text for key, text in first.metadata.items() if key.rpartition("/")[2].startswith("firmware")],
         "log": str(first.origin.source),
-        "report": str(first.report(report, view3d=False)),
+        "report": None if lacking else str(first.report(report, view3d=False)),
     }
     if write_to:
         write_json(write_to, result)
@@ -76,12 +78,14 @@ def report_results(
         show_fleet(terminal.console(), result)
     else:
         show(terminal.console(), scene, result)
+    if lacking:
+        terminal.console().print(f"report  none: {lacking}", markup=False, soft_wrap=True)
 
 
 def _of_vehicle(flight: Flight) -> dict[str, Any]:
     outcome = flight.outcome
     return {
-        "outcome": {"text": str(outcome), **outcome._asdict()},
+        "outcome": {"text": str(outcome), "mark": outcome.mark, **outcome._asdict()},
         "events": [event._asdict() for event in flight.events],
         "rmse": flight.rmse,
         "landed": flight.landed,
@@ -97,9 +101,9 @@ def _of_fleet(flights: Sequence[Flight]) -> dict[str, Any]:
 
 def show(console: Console, scene: Scene, result: dict[str, Any]) -> None:
     """Print the summary of a run."""
+    _outcome(console, result["outcome"])
     show_events(console, result["events"])
     _errors(console, scene[Published], result["rmse"])
-    _outcome(console, result["outcome"])
     _ending(console, result)
 
 
@@ -113,7 +117,7 @@ def show_fleet(console: Console, result: dict[str, Any]) -> None:
 
 
 def _outcome(console: Console, outcome: dict[str, Any], prefix: str = "") -> None:
-    console.print(f"{prefix}{outcome['text']}", style=f"bold {COLOURS.get(outcome['kind'], 'red')}")
+    console.print(f"{prefix}{outcome['text']}", style=f"bold {COLOURS[outcome['mark']]}", markup=False)
 
 
 def _ending(console: Console, result: dict[str, Any]) -> None:

@@ -9,7 +9,7 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.options import Overrides
 from lapwing.cli.output_paths import check_distinct, claim
-from lapwing.cli.preflight import warn_of_gains, warn_of_round_off, with_solver_selected
+from lapwing.cli.preflight import check_gains, warn_of_round_off, warn_of_split_steps, with_solver_selected
 
 if TYPE_CHECKING:
     from lapwing.cosim.config.run_config import RunConfig
@@ -26,7 +26,7 @@ def scenes(
 ) -> None:
     """List scenes with their titles."""
     from lapwing.cosim.scene import SceneError
-    from lapwing.services.common.run_schema import SHIPPED, title
+    from lapwing.services.common.schemas.run_schema import SHIPPED, title
 
     paths = sorted((folder or SHIPPED).glob("*.toml"))
     if not paths:
@@ -60,9 +60,9 @@ def check(
     With --accuracy the exit code is 1 if the error of the solver is larger than solver.accuracy.
     """
     from lapwing.services.common import foreign_code
-    from lapwing.services.common.communication_schema import Communication
-    from lapwing.services.common.run_schema import Run
-    from lapwing.services.common.vehicle_schema import Vehicle
+    from lapwing.services.common.schemas.communication_schema import Communication
+    from lapwing.services.common.schemas.run_schema import Run
+    from lapwing.services.common.schemas.vehicle_schema import Vehicle
     from lapwing.services.scene_resolver import resolve
 
     with foreign_code.permission(allow_code):
@@ -74,11 +74,12 @@ def check(
                 raise SystemExit(1)
             return
         loaded = with_solver_selected(scene, set_ or [])
-        setup = resolve(loaded)
+        config = resolve(loaded)
         exchange, lines = loaded[Communication], [("title", loaded[Run].title or loaded.name)]
         typer.echo(f"{scene}: ok")
-        warn_of_gains(loaded)
+        check_gains(loaded, force=True)
         warn_of_round_off(loaded)
+        warn_of_split_steps(loaded)
         for each in loaded.each_vehicle:
             vehicle = each[Vehicle]
             lines += [
@@ -86,7 +87,7 @@ def check(
                 ("effects", ", ".join(sorted(each.tables("effects"))) or "none"),
                 ("sensors", ", ".join(sorted(each.tables("sensors"))) or "none"),
             ]
-        lines.append(("services", f"{', '.join(setup.order)}; {exchange.rate} Hz, {exchange.coupling}"))
+        lines.append(("services", f"{', '.join(config.order)}; {exchange.rate} Hz, {exchange.coupling}"))
         for label, line in lines:
             typer.echo(f"  {label:<9} {line}")
         if accuracy:
@@ -113,13 +114,13 @@ def _accuracy_of_log(log: Path, accuracy: bool, overrides: list[str], allow_code
         raise ValueError(f"--set solver.accuracy: expected a number above 0, got {limit!r}")
     run = recorded_run(log, allow_code)
     inputs = {"operator": run.operators, "recorded": run.firmware}
-    return flight_accuracy.measure_recorded(run.setup._replace(last_tick=run.last), inputs, _with_bar, limit)
+    return flight_accuracy.measure_recorded(run.config._replace(last_tick=run.last), inputs, _with_bar, limit)
 
 
 def _accuracy_met(result: "FlightAccuracy", json: Path | None) -> bool:
     """Print and write the error of a flight. Return True if it is at most `solver.accuracy`."""
-    from lapwing.studies.accuracy import flight_accuracy_output
-    from lapwing.studies.terminal import console
+    from lapwing.views.studies import flight_accuracy_console as flight_accuracy_output
+    from lapwing.views.terminal import console
 
     flight_accuracy_output.show(console(), result)
     if json:
@@ -127,17 +128,17 @@ def _accuracy_met(result: "FlightAccuracy", json: Path | None) -> bool:
     return result.met
 
 
-def _with_bar(setup: "RunConfig", description: str, work: Callable[[Callable[[int], None]], T]) -> T:
+def _with_bar(config: "RunConfig", description: str, work: Callable[[Callable[[int], None]], T]) -> T:
     """Work on a run in this process, with a line that describes the run and a progress bar."""
     from lapwing.runs.compile_notice import notify_on_compile
     from lapwing.runs.work_progress import WorkProgress
 
-    duration = setup.last_tick * setup.interval
+    duration = config.last_tick * config.interval
     typer.echo(f"flying up to {duration:g} s: {description}")
-    with WorkProgress(setup.scene, duration, "s") as bar, notify_on_compile(setup, bar.compiling):
+    with WorkProgress(config.scene, duration, "s") as bar, notify_on_compile(config, bar.compiling):
 
         def observe(tick: int) -> None:
-            bar.show(tick * setup.interval)
+            bar.show(tick * config.interval)
 
         return work(observe)
 
@@ -155,9 +156,9 @@ def precompile(
     """
     from lapwing.runs.precompile import compile_ahead
     from lapwing.services.scene_resolver import resolve
-    from lapwing.studies.terminal import console
+    from lapwing.views.terminal import console
 
-    paths = [each for items in scenes or [Path("delivery_mission")] for each in _scenes_of(items)]
+    paths = [each for items in scenes or [Path("delivery_mission")] for each in scenes_of(items)]
     sound: dict[str, Any] = {}
     faults: list[ValueError] = []
     for path in paths:
@@ -172,7 +173,7 @@ def precompile(
         raise faults[-1]
 
 
-def _scenes_of(path: Path) -> list[Path]:
+def scenes_of(path: Path) -> list[Path]:
     """Return a scene, or all scenes of a folder."""
     if not path.is_dir():
         return [path]
@@ -191,8 +192,8 @@ def parameters(
 ) -> None:
     """List the autopilot parameters of a scene or at the end of a log."""
     from lapwing.cosim.log import LogReader
-    from lapwing.runs.resimulate import recorded_commands, recorded_setup
-    from lapwing.services.common import parameter_file
+    from lapwing.runs.resimulate import recorded_commands, recorded_config
+    from lapwing.services.autopilot import parameter_file
     from lapwing.services.common.autopilot_parameters import apply_commands
     from lapwing.services.scene_resolver import resolve
 
@@ -200,16 +201,16 @@ def parameters(
     claim(save)
     commands: list = []
     if file.suffix != ".mcap":
-        setup = resolve(with_solver_selected(file, []))
+        config = resolve(with_solver_selected(file, []))
     else:
         with LogReader(file) as read:
-            setup = recorded_setup(read)
-            commands = [command for _, items in recorded_commands(read, setup) for command in items]
-    if not setup.vehicle:
-        raise ValueError(f"{file}: has {len(setup.vehicles)} vehicles; expected a scene or log with one vehicle")
-    if "autopilot" not in setup.services:
+            config = recorded_config(read)
+            commands = [command for _, items in recorded_commands(read, config) for command in items]
+    if not config.vehicle:
+        raise ValueError(f"{file}: has {len(config.vehicles)} vehicles; expected a scene or log with one vehicle")
+    if "autopilot" not in config.services:
         raise ValueError(f"{file}: no autopilot; expected a scene with [autopilot], or its log")
-    known = {p.name: p for p in setup.services["autopilot"].parameters.parameters}
+    known = {p.name: p for p in config.services["autopilot"].parameters.parameters}
     values = apply_commands(known, commands)
     if save:
         parameter_file.write(save, known.values(), values)

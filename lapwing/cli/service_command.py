@@ -75,15 +75,15 @@ def service(options: ServiceOptions) -> None:
     speed = parse_speed(options.speed)
     options.validate_links()
     loaded = with_solver_selected(scene, [*overrides, *plan_options.overrides(plan, scene, overrides)])
-    setup = resolve(loaded, plan_options.commands(plan, loaded))
-    check_pace(f"--speed {options.speed}", speed, setup.interval)
-    if entry.lock_step and entry.name not in setup.services:
+    config = resolve(loaded, plan_options.commands(plan, loaded))
+    check_pace(f"--speed {options.speed}", speed, config.interval)
+    if entry.lock_step and entry.name not in config.services:
         typer.echo(f"{name}: not part of {scene}")  # compose starts every service
         return
     run_participant(
         ProcessSpec(
             name=name,
-            setup=setup,
+            config=config,
             peers=table,
             key_prefix=options.key_prefix,
             speed=speed,

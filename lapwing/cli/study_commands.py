@@ -1,5 +1,6 @@
 """Studies: performance, effects, accuracy, stability, tune."""
 
+import sys
 from collections.abc import Callable
 from functools import partial
 from itertools import count
@@ -59,20 +60,22 @@ def performance(
 
     Published values are shown next to the computed ones.
     """
-    from lapwing.studies import performance_card as study
-    from lapwing.studies.terminal import console
+    from lapwing.studies import performance as study
+    from lapwing.views.terminal import console
 
     _study("SCENE|VEHICLE", subject, json, None, console(), lambda: study.card(subject), study)
 
 
 @app.command()
 def effects(
-    scene: SceneFile,
+    scene: Annotated[
+        Path | None, typer.Argument(metavar="SCENE", help="scene file (TOML), or name of a shipped scene")
+    ] = None,
     set_: Overrides = None,
+    listed: Annotated[bool, typer.Option("--list", help="list all effects with their keys instead")] = False,
     tolerance: Annotated[float, typer.Option(metavar="M", help="largest permitted change of the trajectory")] = 0.01,
     only: Annotated[
-        str | None,
-        typer.Option(metavar="NAME,...", help="effects to study; all without this option"),
+        str | None, typer.Option(metavar="NAME,...", help="effects to study; all without this option")
     ] = None,
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="write the result as JSON")] = None,
     plot: Annotated[Path | None, typer.Option(metavar="FILE", help="write a plot (PNG, SVG or PDF)")] = None,
@@ -84,22 +87,36 @@ def effects(
     """
     from lapwing.cli.progress import StudyProgress
     from lapwing.services.scene_resolver import load
-    from lapwing.studies.effects import console_output
-    from lapwing.studies.effects.procedure import Study, study
-    from lapwing.studies.terminal import console
+    from lapwing.studies.effects.procedure import study
+    from lapwing.views.studies import effects_result
+    from lapwing.views.studies.study_result import show, write_json, write_plot
+    from lapwing.views.terminal import console
 
-    if not tolerance > 0.0:
-        raise ValueError(f"--tolerance {tolerance:g}: expected a distance above 0 m")
-    screen = console()
     names = None if only is None else [name.strip() for name in only.split(",")]
     if names is not None and not all(names):
         raise ValueError(f"--only {only!r}: expected names of effects, separated by commas")
+    if listed:
+        from lapwing.file_schemas.descriptions import effects_list
 
-    def find() -> Study:
-        with StudyProgress(screen, "flights") as progress:
-            return study(load(scene, set_ or []), tolerance, progress.say, names)
+        for line in effects_list(names):
+            typer.echo(line)
+        return
+    if scene is None:
+        raise ValueError("SCENE: missing; expected a scene, or --list (see lapwing effects --help)")
+    check_distinct({"SCENE": scene, "--json": json, "--plot": plot})
+    claim(json)
+    claim_plot(plot)
+    if not tolerance > 0.0:
+        raise ValueError(f"--tolerance {tolerance:g}: expected a distance above 0 m")
+    screen = console()
 
-    _study("SCENE", scene, json, plot, screen, find, console_output)
+    with StudyProgress(screen, "flights") as progress:
+        result = effects_result.result(study(load(scene, set_ or []), tolerance, progress.say, names))
+    show(screen, result)
+    if json:
+        write_json(json, result)
+    if plot:
+        write_plot(plot, result)
 
 
 @app.command()
@@ -108,18 +125,19 @@ def accuracy(
     set_: Overrides = None,
     goal: Annotated[
         float | None,
-        typer.Option("--target", metavar="ERROR", help="find the cheapest solver with at most this error, e.g. 1e-6"),
+        typer.Option("--target", metavar="ERROR", help="error to meet [default: solver.accuracy of a scene, or 1e-6]"),
     ] = None,
     json: Annotated[Path | None, typer.Option(metavar="FILE", help="write all results as JSON")] = None,
     plot: Annotated[
-        Path | None, typer.Option(metavar="FILE", help="plot error over wall time (PNG, SVG or PDF)")
+        Path | None, typer.Option(metavar="FILE", help="plot error over CPU time (PNG, SVG or PDF)")
     ] = None,
 ) -> None:
-    """Measure error against wall time of every integrator.
+    """Measure error against CPU time of every integrator.
 
-    The subject is a reference problem with a known solution, or the plant of a scene.
+    The first line is the cheapest one that meets the target, by evaluations. The subject is a reference problem with a
+    known solution, or the plant of a scene.
     """
-    from lapwing.studies.accuracy import accuracy_command
+    from lapwing.views.studies import accuracy_command
 
     console = accuracy_command.console()
     find = partial(accuracy_command.study, console, target, set_ or [], goal)
@@ -142,13 +160,25 @@ def stability(
 
     Exit codes: 1 a case misses its bound, 2 invalid input.
     """
-    from lapwing.studies.stability import stability_command
+    from lapwing.cli.progress import StudyProgress
+    from lapwing.studies.stability.case_runner import measure, select
+    from lapwing.views.studies import stability_result
+    from lapwing.views.studies.study_result import show, write_json, write_report
+    from lapwing.views.terminal import console
 
     check_distinct({"--json": json, "--report": report})
     claim(json)
     claim_named("--report", report, ".html")
-    passed = stability_command.run(case, slow, sweep, json, report)
-    if not passed:
+    screen, names, done = console(None if sys.stdout.isatty() else 180), select(case, slow, sweep), count(1)
+    with StudyProgress(screen, "cases") as progress:
+        results = measure(names, sweep, lambda name: progress.say(name, next(done), len(names)))
+    page = stability_result.result(results)
+    show(screen, page)
+    if json:
+        write_json(json, page)
+    if report:
+        write_report(report, page)
+    if page.mark == "bad":
         raise SystemExit(1)
 
 
@@ -186,9 +216,11 @@ def tune(
     from lapwing.cli.progress import step_progress
     from lapwing.runs.compile_notice import notify_on_compile
     from lapwing.services.scene_resolver import load, resolve
-    from lapwing.studies.terminal import console
-    from lapwing.studies.tune import console_output, gain_refinement, procedure
-    from lapwing.studies.tune import tuning_report as page
+    from lapwing.studies.tune import gain_refinement, procedure
+    from lapwing.views.studies import tune_result
+    from lapwing.views.studies.study_result import show as show_result
+    from lapwing.views.studies.study_result import write_report
+    from lapwing.views.terminal import console
 
     check_distinct({"SCENE": scene, "--from": log, "--out": out, "--report": report})
     claim_named("--out", out, ".toml")
@@ -209,12 +241,13 @@ def tune(
                 log,
                 lambda: show("flying gain sets", next(numbers)),
             )
-    console_output.show(screen, result)
+    page = tune_result.result(result)
+    show_result(screen, page)
     if out and (force or not result.failures):
         procedure.write(out, result.gains)
         typer.echo(f'{out}: use it with [autopilot] gains = "{out.name}"')
     if report:
-        page.write(report, result)
+        write_report(report, page)
         typer.echo(f"{report}: Bode plots, margins and steps")
     if out and result.failures and not force:
         fail(f"{out}: not written, the gains fail {'; '.join(result.failures)}; use --force to write them", 1)

@@ -29,7 +29,7 @@ LAPSE_POLYNOMIAL = (
 class Atmosphere(NamedTuple):
     """Atmosphere of a day in hydrostatic balance, with a constant temperature offset from the standard."""
 
-    sea_level_pressure: Annotated[float, Ge(85e3), Le(110e3)] = 101_325.0  # [Pa]
+    sea_level_pressure: Annotated[float, Ge(85e3), Le(110e3)] = 101_325.0  # [Pa] pressure at sea level
     temperature_offset: Annotated[float, Ge(-60), Le(60)] = 0.0  # [K] offset from the standard's 15 degC at sea level
 
 

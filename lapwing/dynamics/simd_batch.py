@@ -17,10 +17,11 @@ from numba.core import types
 from numba.core.typing.templates import signature
 from numba.extending import intrinsic
 
-from lapwing.dynamics import rate_control, vector
+from lapwing.dynamics import rate_control
 from lapwing.dynamics.effects import _hooks as hooks
+from lapwing.dynamics.effects._stiff_effects import have_memory_rate
 from lapwing.dynamics.effects._types import AnyMassProperties, PerRotor
-from lapwing.dynamics.vehicles import multirotor_stepper
+from lapwing.dynamics.vehicles import multirotor_stepper, step_bound
 from lapwing.dynamics.vehicles.multirotor_equations import (
     MultirotorDrive,
     MultirotorParameters,
@@ -30,11 +31,9 @@ from lapwing.dynamics.vehicles.multirotor_equations import (
 from lapwing.kernels import always_inline, kernel, math, vectorise_loops
 from lapwing.kernels.codegen import compile_source, generic, map_index
 from lapwing.kernels.row_packing import construction, leaves, pack_row, row_width
-from lapwing.kernels.state_tree import finite
 
 WIDTH = 16  # number of members of a block
 LINE = 8  # numbers in a cache line
-LARGEST_TURN = 0.25  # [rad] rotation in a step beyond which no method is accurate
 
 
 class Member(NamedTuple):
@@ -148,7 +147,8 @@ def advance_along(method, like, memory, columns, keys, ticks, commands, motions,
 
 @always_inline
 def _parts(like, memory, at, h):
-    return multirotor_stepper.parts(take(like, memory, at).parameters.layout, h)
+    m = take(like, memory, at)
+    return step_bound.parts(m.parameters, motion_of(m.parameters.layout, m.motion), m.memory, h)
 
 
 @always_inline
@@ -160,13 +160,13 @@ def _is_alike(like, memory, at, interval, h, split):
     m = take(like, memory, at)
     p, end = m.parameters, m.start + interval
     breaks = multirotor_stepper.next_break(p, m.memory, m.start, interval, end, h / split) < math.inf
-    return multirotor_stepper.parts(p.layout, h) == split and not breaks and hooks.all_can_sleep(p.effects, m.memory)
+    alike = step_bound.parts(p, motion_of(p.layout, m.motion), m.memory, h) == split and not breaks
+    return alike and hooks.all_can_sleep(p.effects, m.memory)
 
 
 @always_inline
 def _is_valid(like, memory, at, h):
-    motion = take(like, memory, at).motion
-    return finite(motion) & (vector.norm(motion.omega_body) * h <= LARGEST_TURN)
+    return step_bound.is_valid(take(like, memory, at).motion, h)
 
 
 @always_inline
@@ -200,11 +200,18 @@ def _is_awake(like, memory, at, i, h):
     return multirotor_stepper.switches(drive, m.start + i * h, m.motion, h) or not asleep
 
 
+@generic(inline=True)
+def _integrated(effects: types.Type, changed: types.Type) -> Callable:
+    """Return the motion, and the memory if a step changes it."""
+    return (lambda effects, changed: changed) if have_memory_rate(effects) else (lambda effects, changed: (changed[0],))
+
+
 @always_inline
 def _airborne_step(method, like, memory, at, i, h):
     m = take(like, memory, at)
     drive = MultirotorDrive(m.parameters, m.body, m.memory, m.voltage)
-    give((multirotor_stepper.airborne_step(method, drive, m.start + i * h, m.motion, h),), memory, at)
+    changed = multirotor_stepper.airborne_step(method, drive, m.start + i * h, m.motion, h)
+    give(_integrated(m.parameters.effects, changed), memory, at)
 
 
 @kernel

@@ -1,22 +1,61 @@
 """Conversion of pydantic's validation errors into `ConfigError`."""
 
 import types
-from collections.abc import Sequence
-from typing import Annotated, Any, Literal, Union, get_args, get_origin, get_type_hints
+from collections.abc import Callable, Mapping, Sequence
+from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from annotated_types import Ge, Gt, Le, Lt
 from pydantic import BaseModel, ValidationError
 from pydantic.fields import FieldInfo
 
+from lapwing.dynamics import units
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.field_comments import comments, split
 
+T = TypeVar("T")
 BOUNDS = {Gt: ("gt", "above"), Ge: ("ge", "at least"), Lt: ("lt", "below"), Le: ("le", "at most")}
 NAMES = {float: "a number", int: "a whole number", str: "a text", bool: "true or false", dict: "a table"}
 UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 OF_NUMBERS = ("float_type", "int_type", "int_from_float", "float_parsing", "int_parsing", *(
     "greater_than", "greater_than_equal", "less_than", "less_than_equal"))  # fmt: skip
 LONGEST = 60  # shown characters of an invalid value
+
+
+def validated(validate: Callable[[Any], T], table: Any, model: type) -> T:
+    """Return the validated table; a number may also be a text with a unit of its kind, for example "30 deg".
+
+    Args:
+        validate: function of pydantic for the table.
+        table: mapping or list of plain data, which is not changed.
+        model: pydantic model or NamedTuple, whose comments state the units.
+
+    Raises:
+        ConfigError: a value is invalid; its key is relative to the table.
+    """
+    while True:
+        try:
+            return validate(table)
+        except ValidationError as error:
+            converted = table
+            for each in error.errors():
+                if each["type"] in OF_NUMBERS and isinstance(each["input"], str):
+                    number = units.parse(each["input"], _unit(model, each["loc"]).strip(" []"))
+                    converted = converted if number is None else _replaced(converted, each["loc"], number)
+            if converted is table:
+                raise fault(error, model) from None
+            table = converted
+
+
+def _replaced(value: Any, location: Sequence[str | int], new: float) -> Any:
+    """Return a copy of plain data with another value at a location; the data itself if it has no such place."""
+    if not location:
+        return new
+    first, *rest = location
+    if isinstance(value, Mapping) and first in value:
+        return {**value, first: _replaced(value[first], rest, new)}
+    if isinstance(value, list | tuple) and isinstance(first, int) and first < len(value):
+        return type(value)(_replaced(item, rest, new) if i == first else item for i, item in enumerate(value))
+    return value
 
 
 def fault(error: ValidationError, model: type) -> ConfigError:

@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Union, get_args, get_origin
 
 from pydantic.fields import FieldInfo
 
-from lapwing.file_schemas.key_docs import REQUIRED, Key, is_table, keys
+from lapwing.file_schemas.key_docs import REQUIRED, Key, description, is_table, keys
 
 Schema = dict[str, Any]
 PLAIN = {float: "number", int: "integer", str: "string", bool: "boolean", dict: "object"}
@@ -54,9 +54,8 @@ def required_keys(names: list[str]) -> Schema:
 def key_schema(key: Key) -> Schema:
     """Return the schema of a key with its description and default."""
     result = schema_of(key.hint)
-    description = " ".join(filter(None, (f"[{key.unit}]" if key.unit else "", key.meaning)))
-    if description:
-        result["description"] = description
+    if text := description(key):
+        result["description"] = text
     if (plain := _plain(key.default)) is not None:
         result["default"] = plain
     return result

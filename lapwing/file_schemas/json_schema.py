@@ -1,6 +1,6 @@
 """JSON schemas of the TOML files that users write: scenes, airframes, gain sets."""
 
-import sys
+import re
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any
@@ -8,7 +8,9 @@ from typing import Any
 from lapwing.cosim.scene import SceneTable
 from lapwing.cosim.scene.vehicle_scenes import MAX_VEHICLES
 from lapwing.dynamics import effects, integrators
+from lapwing.dynamics.units import UNITS
 from lapwing.dynamics.vehicles.airframe import Airframe
+from lapwing.file_schemas import descriptions
 from lapwing.file_schemas.annotations import Schema, closed_table, required_keys, table_schema
 from lapwing.services.autopilot import gains
 from lapwing.services.autopilot.gains import GainSet
@@ -20,6 +22,7 @@ from lapwing.services.sensors.fault_schedule import SLOTS, FaultTable
 from lapwing.services.sensors.registry import sensors
 from lapwing.services.trajectory.segments import KINDS
 from lapwing.services.trajectory.trajectory_compiler import CHANNELS
+from lapwing.services.trajectory.waypoints import Waypoint
 
 DRAFT = "http://json-schema.org/draft-07/schema#"
 TEXT: Schema = {"type": "string"}
@@ -34,16 +37,6 @@ USER_SEGMENT: Schema = {
     "properties": {**OWN["properties"], "kind": {**TEXT, "description": "name of the segment in the module"}},
     "required": ["kind", "module"],
 }
-
-
-def effect_tables() -> dict[str, tuple[type, type]]:
-    """Return (parameter class, class with the keys of its table) of every effect, by name."""
-    return {name: (cls := effects.parameter_class(name), _settings(cls)) for name in effects.names()}
-
-
-def _settings(cls: type) -> type:
-    """Return the class with the keys of an effect's table; some effects resolve it to another class."""
-    return sys.modules[cls.__module__].Settings if hasattr(cls, "from_scene") else cls
 
 
 def sensor_tables() -> dict[str, tuple[ModuleType, type]]:
@@ -68,8 +61,8 @@ def scene_schema() -> Schema:
     # omits tables without own keys
     sections = {name: s for name, s in vocabulary().sections.items() if s.model_fields or not s.FROM_FILE}
     tables = {name: _section(section) for name, section in sections.items()}
-    tables["effects"] |= _or_own({name: table_schema(settings) for name, (_, settings) in effect_tables().items()})
-    tables["sensors"] |= _or_own({name: _sensor(module, cls) for name, (module, cls) in sensor_tables().items()})
+    tables["effects"] |= _or_own({name: _effect(name) for name in effects.names()})
+    tables["sensors"] |= _or_own({name: _sensor(name, module, cls) for name, (module, cls) in sensor_tables().items()})
     tables["solver"]["properties"]["integrator"]["enum"] = integrators.names()
     tables["vehicle"]["properties"]["model"]["enum"] = list(models.names())
     tables["autopilot"]["properties"]["parameters"] = FIRMWARE_PARAMETERS
@@ -78,6 +71,11 @@ def scene_schema() -> Schema:
     for name, section in sections.items():
         if section.FROM_FILE:  # the keys of a scene override those of the file
             tables[name] = _optional(tables[name])
+    del tables["trajectory"]["required"]
+    tables["trajectory"]["oneOf"] = [required_keys([key]) for key in ("phase", "waypoints")]
+    points = tables["trajectory"]["properties"]["waypoints"]
+    in_metres = points["items"] | {"description": "[m] x, y, z; a fourth number is the yaw in rad"}
+    points["items"] = {"anyOf": [in_metres, table_schema(Waypoint)]}
     phase = tables["trajectory"]["properties"]["phase"]["items"]["properties"]
     segment = {"$ref": "#/definitions/segment"}
     for channel in CHANNELS:
@@ -86,7 +84,10 @@ def scene_schema() -> Schema:
             "description": f"[{unit}] a segment, or a list of them",
             "anyOf": [segment, {"type": "array", "items": segment}],
         }
-    tables["vehicle"] = {"anyOf": [tables["vehicle"], _fleet(tables, sections)]}
+    for axis, figure in tables["published"]["properties"]["rmse"]["properties"].items():
+        figure["description"] = f"[{'m' if axis in 'xyz' else 'rad'}] published tracking error along or about this axis"
+    vehicles = [tables["vehicle"], _fleet(tables, sections)]
+    tables["vehicle"] = {"description": vehicles[0]["description"], "anyOf": vehicles}
     needed = [name for name, table in tables.items() if "required" in table and not sections[name].OPTIONAL]
     result = {**_head("Lapwing scene"), **closed_table(tables), **required_keys(needed)}
     return {**result, "definitions": {"segment": {"anyOf": [*map(_segment, KINDS), USER_SEGMENT]}}}
@@ -102,7 +103,28 @@ def gains_schema() -> Schema:
     return {**_head("Lapwing gain set"), **table_schema(GainSet)}
 
 
-SCHEMAS: dict[str, Callable[[], Schema]] = {"scene": scene_schema, "airframe": airframe_schema, "gains": gains_schema}
+def with_units(node: Any, unit: str = "") -> Any:
+    """Return a schema in which numbers may be texts with a unit, such as "30 deg"; `unit` is that of the whole node."""
+    if isinstance(node, list):
+        return [with_units(item) for item in node]
+    if not isinstance(node, dict):
+        return node
+    unit = node["description"][1:].partition("]")[0] if str(node.get("description")).startswith("[") else unit
+    inner = {key: with_units(value, unit if key == "items" else "") for key, value in node.items() if key != "default"}
+    if "default" in node:
+        inner["default"] = node["default"]
+    if node.get("type") == "number" and unit in UNITS:
+        names = "|".join(map(re.escape, UNITS[unit]))
+        inner |= {"type": ["number", "string"], "pattern": rf"^[+-]?[0-9.]+(e[+-]?[0-9]+)? *({names})$"}
+    return inner
+
+
+SCHEMAS: dict[str, Callable[[], Schema]] = {
+    "scene": lambda: with_units(scene_schema()),
+    "airframe": lambda: with_units(airframe_schema()),
+    "gains": gains_schema,
+}
+"""Functions that return the schema of a kind of file, for editors."""
 
 
 def _head(title: str) -> Schema:
@@ -118,7 +140,8 @@ def _fleet(tables: Schema, sections: dict[str, type[SceneTable]]) -> Schema:
     names = [name for name, section in sections.items() if name != "vehicle" and not section.SHARED]
     own = {name: _partial(tables[name], f"#/properties/{name}") for name in names}
     properties = dict(tables["vehicle"]["properties"])
-    properties["airframe"] = {"anyOf": [properties["airframe"], own.pop("airframe")]}
+    text = "airframe file, or keys that override those of the scene's airframe"
+    properties["airframe"] = {"description": text, "anyOf": [properties["airframe"], own.pop("airframe")]}
     items = closed_table({**properties, **own})
     text = "several vehicles: the tables of each override those of the scene"
     return {"type": "array", "minItems": 1, "maxItems": MAX_VEHICLES, "items": items, "description": text}
@@ -140,22 +163,30 @@ def _or_own(tables: dict[str, Schema]) -> Schema:
     return {**closed_table(tables), "additionalProperties": OWN}
 
 
-def _sensor(module: Any, cls: type) -> Schema:
+def _effect(name: str) -> Schema:
+    return {"description": descriptions.effect(name), **table_schema(descriptions.effect_settings(name))}
+
+
+def _sensor(name: str, module: Any, cls: type) -> Schema:
     """Return the schema of a sensor: a preset, keys that differ from it, and faults where it has channels."""
-    preset = {"enum": list(module.PRESETS), "default": next(iter(module.PRESETS))}
-    if not hasattr(module, "CHANNELS"):
-        return closed_table({"preset": preset, **table_schema(cls)["properties"]})
-    fault = table_schema(FaultTable)
-    fault["properties"]["channel"] = {"enum": ["all", *module.CHANNELS], "default": "all"}
-    faults = {"type": "array", "items": fault, "maxItems": SLOTS, "description": "by schedule"}
+    about = "; ".join(f"{preset}: {text}" for preset, text in descriptions.presets(name, module).items())
+    preset = {"description": about, "enum": list(module.PRESETS), "default": next(iter(module.PRESETS))}
     table = table_schema(cls, leave_out=["faults"])
-    return closed_table({"preset": preset, **table["properties"], "faults": faults})
+    properties = {"preset": preset, **table["properties"]}
+    if hasattr(module, "CHANNELS"):
+        fault = table_schema(FaultTable)
+        fault["properties"]["channel"] |= {"enum": ["all", *module.CHANNELS], "default": "all"}
+        text = "faults by schedule"
+        properties["faults"] = {"type": "array", "items": fault, "maxItems": SLOTS, "description": text}
+    return {"description": descriptions.sensor(module), **closed_table(properties)}
 
 
 def _parameters() -> Schema:
     """Return the schema of the autopilot's parameters: values by name, or the name of a file."""
     fixed, by_gains = flight_parameters()
-    properties = {p.name: _parameter(p) for p in fixed} | {p.name: {"type": "number"} for p in by_gains}
+    properties = {p.name: _parameter(p) for p in fixed} | {
+        p.name: {"type": "number", "description": f"{p.meaning}; default: that of the gain set"} for p in by_gains
+    }
     return {"description": "values by name, or the name of a file of them", "anyOf": [closed_table(properties), TEXT]}
 
 
@@ -169,7 +200,7 @@ def _segment(kind: str) -> Schema:
     """Return the schema of a segment of one kind; the points of a table may be in a file."""
     table = table_schema(KINDS[kind])
     table["description"] = " ".join((KINDS[kind].__doc__ or "").split())
-    table["properties"]["kind"] = {"enum": [kind]}
+    table["properties"]["kind"] = {"enum": [kind], "description": "kind of the segment"}
     needed = [name for name in table.get("required", []) if name != "points"]
     return {**table, "required": ["kind", *needed]}
 

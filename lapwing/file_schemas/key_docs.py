@@ -31,6 +31,11 @@ def keys(cls: type) -> list[Key]:
     ]
 
 
+def description(key: Key) -> str:
+    """Return unit and meaning of a key."""
+    return " ".join(filter(None, (f"[{key.unit}]" if key.unit else "", key.meaning)))
+
+
 def _purpose(hint: Any) -> str:
     """Return the description of a table from the docstring of its class."""
     members = [member for member in get_args(hint) or (hint,) if isinstance(member, type) and member is not type(None)]

@@ -2,11 +2,14 @@
 
 ```python
 import gymnasium
-import lapwing.gym  # registers them
 
-environments = gymnasium.make_vec("lapwing/Hover-v0", num_envs=1024, vectorization_mode="vector_entry_point")
-one = gymnasium.make("lapwing/Race-v0")
+vector_mode = {"num_envs": 1024, "vectorization_mode": "vector_entry_point"}
+environments = gymnasium.make_vec("lapwing.gym:lapwing/Hover-v0", **vector_mode)
+one = gymnasium.make("lapwing.gym:lapwing/Race-v0")
 ```
+
+Gymnasium imports the module before the colon, which registers the environments. Without it, import this module first:
+Gymnasium has no plug-ins since version 1.0.
 
 Needs `pip install lapwing[gym]`.
 """

@@ -1,12 +1,12 @@
 """Gymnasium environments: a `lapwing.BatchSimulator` under thrust and body rates, with a task."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from lapwing.batch_simulator import BatchSimulator
+from lapwing.api.batch_simulator import BatchSimulator
 from lapwing.cosim.scene import Overrides, Scene, SceneError
 from lapwing.gym import step_kernels
 from lapwing.gym.step_kernels import BOUNDS, Episodes, Results
@@ -36,6 +36,8 @@ class DroneVectorEnv(VectorEnv):
     """
 
     metadata = {"autoreset_mode": AutoresetMode.NEXT_STEP, "render_modes": []}  # noqa: RUF012
+    _generators: tuple[np.random.Generator, ...] | None = None  # that of each vehicle, after a list of seeds
+    _seeds: tuple[int, ...] = ()
 
     def __init__(
         self,
@@ -78,10 +80,47 @@ class DroneVectorEnv(VectorEnv):
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self._episodes = Episodes(np.zeros(num_envs, np.int64), np.zeros(num_envs, bool), np.zeros((num_envs, 6)))
 
-    def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[np.ndarray, dict]:
-        """Start an episode with every vehicle."""
-        if seed is not None:
+    def __getstate__(self) -> dict[str, Any]:
+        """Return the state for copies and pickles, without the view of the memory of `batch`."""
+        return {name: value for name, value in vars(self).items() if name != "_vehicles"}
+
+    def __setstate__(self, state: dict[str, Any]) -> None:
+        """Restore a copy, which continues from the same states and random numbers."""
+        vars(self).update(state)
+        self._vehicles = step_kernels.Vehicles(*self.batch.memory, self.batch.interval, self._ground)
+
+    @property  # type: ignore[override]
+    def np_random(self) -> np.random.Generator | tuple[np.random.Generator, ...]:
+        """Generator of all vehicles; after a reset with a list of seeds, that of each."""
+        return super().np_random if self._generators is None else self._generators
+
+    @np_random.setter
+    def np_random(self, value: np.random.Generator) -> None:
+        self._np_random, self._np_random_seed, self._generators = value, -1, None
+
+    @property
+    def np_random_seed(self) -> int | tuple[int, ...] | None:  # type: ignore[override]
+        """Seed of `np_random`, or of each of its generators; -1 if unknown."""
+        return super().np_random_seed if self._generators is None else self._seeds
+
+    def reset(
+        self, *, seed: int | Sequence[int | None] | None = None, options: dict | None = None
+    ) -> tuple[np.ndarray, dict]:
+        """Start an episode with every vehicle.
+
+        Args:
+            seed: seed of one generator for all vehicles, or a seed for each, with which a vehicle starts as that of a
+                `DroneEnv` with the same seed; None continues with the present random numbers.
+            options: not used.
+
+        Raises:
+            ValueError: the list has not one seed for each vehicle.
+        """
+        if isinstance(seed, Sequence | np.ndarray):
+            self._seed_each(seed)
+        elif seed is not None:
             self._np_random, self._np_random_seed = seeding.np_random(seed)
+            self._generators = None
         observations = np.empty((self.num_envs, len(BOUNDS)), np.float32)
         self._begin(np.arange(self.num_envs), observations)
         return observations, {}
@@ -112,9 +151,23 @@ class DroneVectorEnv(VectorEnv):
         np.logical_or(results.terminated, results.truncated, out=episodes.over)
         return *results, {}
 
+    def _seed_each(self, seeds: Sequence[int | None]) -> None:
+        if len(seeds) != self.num_envs:
+            raise ValueError(f"seed: expected {self.num_envs} seeds, one for each vehicle, got {len(seeds)}")
+        present = zip(self._generators, self._seeds, strict=True) if self._generators else ()
+        pairs = list(present) or [seeding.np_random() for _ in seeds]
+        for k, seed in enumerate(seeds):
+            if seed is not None:
+                pairs[k] = seeding.np_random(int(seed))
+        self._generators, self._seeds = tuple(pair[0] for pair in pairs), tuple(pair[1] for pair in pairs)
+
     def _begin(self, members: np.ndarray, observations: np.ndarray) -> None:
         """Start episodes of these vehicles, and write their observations."""
-        positions = starts(self.np_random, self._ground, len(members))
+        own = self._generators
+        if own is None:
+            positions = starts(super().np_random, self._ground, len(members))
+        else:
+            positions = np.concatenate([starts(own[k], self._ground, 1) for k in members])
         self.batch.restart(members, position_world=positions, rotor_speed=self._hover_speed)
         self._episodes.gates[members], self._episodes.over[members] = 0, False
         step_kernels.observe_members(self.task, self._vehicles, self._episodes, observations, members)
@@ -133,7 +186,8 @@ class DroneEnv(gymnasium.Env):
     def reset(self, *, seed: int | None = None, options: dict | None = None) -> tuple[np.ndarray, dict]:
         """Start an episode."""
         super().reset(seed=seed)
-        observations, _ = self._vector_env.reset(seed=seed)
+        self._vector_env.np_random = self.np_random
+        observations, _ = self._vector_env.reset()
         return observations[0], {}
 
     def step(self, action: Any) -> tuple[np.ndarray, float, bool, bool, dict]:

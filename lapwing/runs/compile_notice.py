@@ -20,9 +20,9 @@ class Compilation(NamedTuple):
     services: tuple[str, ...]
 
     @classmethod
-    def of(cls, setup: RunConfig) -> Self:
+    def of(cls, config: RunConfig) -> Self:
         """Return the notice for a run."""
-        return cls(setup.scene, tuple(setup.services))
+        return cls(config.scene, tuple(config.services))
 
     @property
     def notice(self) -> str:
@@ -31,11 +31,11 @@ class Compilation(NamedTuple):
 
 
 @contextmanager
-def notify_on_compile(setup: RunConfig, show: Callable[[Compilation], None]) -> Iterator[None]:
+def notify_on_compile(config: RunConfig, show: Callable[[Compilation], None]) -> Iterator[None]:
     """Show a notice once when a kernel is compiled within the context, for a run in this process.
 
     Args:
-        setup: run configuration.
+        config: run configuration.
         show: shows the notice.
     """
     active = True
@@ -44,7 +44,7 @@ def notify_on_compile(setup: RunConfig, show: Callable[[Compilation], None]) -> 
         nonlocal active
         if active:
             active = False
-            show(Compilation.of(setup))
+            show(Compilation.of(config))
 
     on_compile(listener)
     try:

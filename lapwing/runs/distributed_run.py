@@ -35,15 +35,15 @@ def monitor_run(
         ValueError: invalid key prefix, or the certificate cannot be used.
         Interrupted: ended by a signal.
     """
-    setup, peers, key_prefix = spec.setup, spec.peers, spec.key_prefix
+    config, peers, key_prefix = spec.config, spec.peers, spec.key_prefix
     check_key_prefix(key_prefix)
     external = spec.external or {}
-    names = set(process_table.required_processes(setup, external))
-    clock, participants = Clock(observer, setup, names), PublisherIds(key_prefix, external=tuple(external))
+    names = set(process_table.required_processes(config, external))
+    clock, participants = Clock(observer, config, names), PublisherIds(key_prefix, external=tuple(external))
     listen, connect = mesh(MONITOR, peers)
-    gid, security = participants.gid(MONITOR), settings(setup, MONITOR, key_prefix, spec.keys)
+    gid, security = participants.gid(MONITOR), settings(config, MONITOR, key_prefix, spec.keys)
     with Stop() as stop, ZenohBus(listen, connect, gid=gid, security=security) as bus:
-        watch = RunMonitor(bus, participants, peers, LOST, setup.services)
+        watch = RunMonitor(bus, participants, peers, LOST, config.services)
         leave = bus.declare_liveliness(f"{key_prefix}/{ALIVE_KEY}/{MONITOR}")
         try:
             _follow(watch, clock, stop, names, live)
@@ -119,7 +119,7 @@ def external_services(peers: Mapping[str, str]) -> dict[str, str]:
     return {name: endpoint for name, endpoint in peers.items() if f"{name}{ENCODER}" in peers}
 
 
-def parse_external(texts: Iterable[str], setup: RunConfig) -> dict[str, str]:
+def parse_external(texts: Iterable[str], config: RunConfig) -> dict[str, str]:
     """Return each "name=endpoint" as a table.
 
     Raises:
@@ -128,7 +128,7 @@ def parse_external(texts: Iterable[str], setup: RunConfig) -> dict[str, str]:
     result = {}
     for text in texts:
         name, _, endpoint = text.partition("=")
-        choices = [service for service in setup.services if service != process_table.CLOCK_OWNER]
+        choices = [service for service in config.services if service != process_table.CLOCK_OWNER]
         if name not in choices:
             raise ValueError(f"--external {text}: expected NAME=ENDPOINT with one of {', '.join(choices)}")
         check_endpoint(f"--external {name}", endpoint)

@@ -1,7 +1,7 @@
 """Run with every service in a separate process."""
 
 import time
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Collection, Iterable
 from contextlib import nullcontext
 from typing import IO
 
@@ -9,10 +9,11 @@ from lapwing.cosim.access.publisher_ids import PublisherIds, new_secret
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.multi_vehicle import primary_topic
 from lapwing.cosim.processes.child_process import Child
-from lapwing.cosim.processes.interrupt import Stop
+from lapwing.cosim.processes.interrupt import Interrupted, Stop
 from lapwing.cosim.processes.launcher import launch
 from lapwing.cosim.processes.run_monitor import RunMonitor
 from lapwing.cosim.processes.shared_core import CoreClaim, claim_any
+from lapwing.cosim.run_errors import RunFailed
 from lapwing.cosim.transport.bus_keys import check_key_prefix
 from lapwing.messages.topics import POSE, STATUS
 from lapwing.runs.compile_notice import Compilation
@@ -20,6 +21,7 @@ from lapwing.runs.observer import Elapsed, Observer
 from lapwing.services import process_table
 from lapwing.services.process_main import ProcessSpec, write_spec
 
+SLOW, GAIN = 5.0, 2.0  # [s] wall time, and its ratio to the time in one process, above which that mode is advised
 NOTICE = 5.0  # [s] after which participants that are started elsewhere and have not joined are named
 
 
@@ -45,17 +47,17 @@ def fly_processes(
         Interrupted: ended by a signal.
     """
     check_key_prefix(spec.key_prefix)
-    setup, spec = spec.setup, spec._replace(secret=new_secret())
+    config, spec = spec.config, spec._replace(secret=new_secret())
     external = spec.external or {}
-    clock = Clock(observer, setup, external)
-    names = [*process_table.required_processes(setup, external), *([process_table.ROUTER] if spec.open else [])]
-    claim = core_of_services(setup)
+    clock = Clock(observer, config, external)
+    names = [*process_table.required_processes(config, external), *([process_table.ROUTER] if spec.open else [])]
+    claim = core_of_services(config)
 
     def send_spec(name: str, endpoints: dict[str, str], stream: IO[bytes]) -> None:
         own_spec = spec._replace(
             name=name,
             peers=endpoints,
-            core=claim.core if claim and name in setup.services else None,
+            core=claim.core if claim and name in config.services else None,
             open=spec.open if name == process_table.ROUTER else (),
             with_parent=True,
         )
@@ -68,11 +70,20 @@ def fly_processes(
             live(watch)
             return clock.observe(watch) or stop.number is not None
 
-        outputs = launch(names, send_spec, participants, observe, [*auxiliary], external, early or {}, setup.services)
+        try:
+            outputs = launch(
+                names, send_spec, participants, observe, [*auxiliary], external, early or {}, config.services
+            )
+        except RunFailed as error:
+            if stop.number is not None:
+                raise Interrupted(stop.number, str(error)) from None
+            raise
         for name, output in outputs.items():
             for line in output.splitlines():
                 observer.say(f"{name}: {line}")
         stop.check()
+    if spec.speed is None and (hint := clock.faster_mode(config.services)):
+        observer.say(hint)
     if clock.rejected:
         observer.say(f"rejected: {clock.rejected} messages from outside the run")
     return clock.elapsed
@@ -83,20 +94,21 @@ class Clock:
 
     Args:
         observer: shows the progress.
-        setup: run configuration.
+        config: run configuration.
         elsewhere: names of participants that somebody else starts.
     """
 
-    def __init__(self, observer: Observer, setup: RunConfig, elsewhere: Iterable[str] = ()):
+    def __init__(self, observer: Observer, config: RunConfig, elsewhere: Iterable[str] = ()):
         self._elsewhere, self._created = set(elsewhere), time.monotonic()
         self._observer, self._started, self._slow_disk = observer, False, False
-        self._pose, self._status = primary_topic(setup, POSE), primary_topic(setup, STATUS)
-        self._compilation: Compilation | None = Compilation.of(setup)  # None after it was shown
+        self._pose, self._status = primary_topic(config, POSE), primary_topic(config, STATUS)
+        self._compilation: Compilation | None = Compilation.of(config)  # None after it was shown
         self.elapsed, self.rejected = Elapsed(0.0, 0.0), 0
+        self._block_times: dict[str, float] = {}
 
     def observe(self, watch: RunMonitor) -> bool:
         """Show the progress. Return False, so that the run continues."""
-        self.rejected = watch.rejected
+        self.rejected, self._block_times = watch.rejected, watch.block_times
         if watch.start is None:
             if watch.compiling and self._compilation:
                 self._observer.compiling(self._compilation)
@@ -116,7 +128,17 @@ class Clock:
         self._observer.show(watch.time_ns, watch.newest.get(self._pose), watch.newest.get(self._status))
         return False
 
+    def faster_mode(self, services: Collection[str]) -> str:
+        """Return the advice for the next run after a flight that was slow because its processes exchange data.
 
-def core_of_services(setup: RunConfig) -> CoreClaim | None:
+        The estimate is the processor time of all blocks, which one process steps in turn; "" if it gains little.
+        """
+        seconds, wall = sum(self._block_times.values()), self.elapsed.wall
+        if self._block_times.keys() < set(services) or wall < SLOW or wall < GAIN * seconds:
+            return ""
+        return f"--mode single-process: the same bits in about {max(seconds, 0.1):.1f} s instead of {wall:.1f} s"
+
+
+def core_of_services(config: RunConfig) -> CoreClaim | None:
     """Claim a core for all services with Gauss-Seidel coupling, which work one at a time; None for any core."""
-    return claim_any() if setup.coupling == "gauss_seidel" else None
+    return claim_any() if config.coupling == "gauss_seidel" else None

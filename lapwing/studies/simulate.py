@@ -10,16 +10,16 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.run_errors import DivergedError, LockStepError
 from lapwing.cosim.scene import Scene
+from lapwing.flights.flight_data import FlightData
 from lapwing.messages.topics import Topic, template_topic
 from lapwing.services.common.operator_inbox import Operator, no_operator
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import resolve
-from lapwing.studies.flight_data import FlightData
 
 F = TypeVar("F", bound=FlightData)
 
 LOOK = 250  # [ticks] between two calls of an observer
-PAGE = 64  # [ticks] history of ports whose full history is not requested; more than the commander needs
+KEPT_TICKS = 64  # [ticks] history of ports whose full history is not requested; more than the commander needs
 
 
 def fly(
@@ -54,7 +54,7 @@ def fly_each(
 
 
 def fly_with_ports(
-    setup: RunConfig,
+    config: RunConfig,
     only: Collection[Topic] | None = None,
     observe: Callable[[int], None] | None = None,
     operator: Operator | Mapping[str, Operator] = no_operator,
@@ -64,8 +64,8 @@ def fly_with_ports(
 
     See `fly` and `process_table.create_all` for arguments.
     """
-    graph, _, failure, diverged = _fly(setup, only, operator, None, observe, True, recorded)
-    return FlightData.of_each(graph, only, failure, diverged), graph
+    diagram, _, failure, diverged = _fly(config, only, operator, None, observe, True, recorded)
+    return FlightData.of_each(diagram, only, failure, diverged), diagram
 
 
 def _fly(
@@ -78,8 +78,8 @@ def _fly(
     recorded: Mapping[str, Any] = MappingProxyType({}),
 ) -> tuple[BlockDiagram, Collection[Topic] | None, str, bool]:
     """Return (block diagram at the end, `only`, reason of an early end, True for a non-finite state)."""
-    setup = run if isinstance(run, RunConfig) else resolve(run)
-    services = create_all(setup, operator, recorded)
+    config = run if isinstance(run, RunConfig) else resolve(run)
+    services = create_all(config, operator, recorded)
     encoders = [encoder for service in services for encoder in service.encoders]
     selected = {
         encoder.port
@@ -88,17 +88,17 @@ def _fly(
     }
     if every_port:
         selected = {port.name for service in services for part in service.parts for port in part.outputs}
-    graph, failure, diverged = BlockDiagram(setup, services, PAGE, selected, rows), "", False
+    diagram, failure, diverged = BlockDiagram(config, services, KEPT_TICKS, selected, rows), "", False
     try:
-        look = setup.last_tick + 1 if observe is None else LOOK
-        while graph.tick <= setup.last_tick and not graph.ended:
+        look = config.last_tick + 1 if observe is None else LOOK
+        while diagram.tick <= config.last_tick and not diagram.ended:
             if observe is not None:
-                observe(graph.tick)
-            graph.advance(min(graph.tick + look, setup.last_tick + 1))
+                observe(diagram.tick)
+            diagram.advance(min(diagram.tick + look, config.last_tick + 1))
     except LockStepError as error:
-        if graph.tick == 0 and not isinstance(error, DivergedError):  # a firmware did not start: there is no flight
+        if diagram.tick == 0 and not isinstance(error, DivergedError):  # a firmware did not start: there is no flight
             raise
         failure, diverged = str(error), isinstance(error, DivergedError)
     finally:
-        graph.close()
-    return graph, only, failure, diverged
+        diagram.close()
+    return diagram, only, failure, diverged

@@ -5,6 +5,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from collections.abc import Callable, Iterable, Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
@@ -14,6 +15,7 @@ from multiprocessing.connection import Connection
 from multiprocessing.context import SpawnContext
 from typing import Any
 
+from lapwing.cosim.processes.patience import Patience
 from lapwing.cosim.run_errors import RunFailed
 
 # Suppresses the warning of the resource tracker when it removes semaphores of a killed process
@@ -24,6 +26,8 @@ Workers = Callable[[Callable[..., Any], Iterable[tuple]], Iterator[tuple[int, An
 """(call, tasks) -> (index of the task, call(*task)) in order of completion."""
 
 
+END_TIMEOUT = 1.0  # [s] from an error to the end of all workers
+POLL = 0.02  # [s] between two checks whether they have ended
 REPEAT = "run the same command again"  # advice after a lost process
 CONTINUE = f"{REPEAT} to continue"  # if the results so far are kept
 
@@ -48,6 +52,7 @@ def workers(number: int, advice: str = REPEAT) -> Iterator[ProcessPoolExecutor]:
             yield pool
         except BaseException as error:
             ours.close()  # unfinished work is not needed
+            threading.Thread(target=_kill_late, daemon=True).start()
             if isinstance(error, BrokenProcessPool):
                 message = "a worker process has ended unexpectedly, perhaps out of memory"
                 raise RunFailed(f"{message}; {advice}") from None
@@ -88,6 +93,16 @@ def _pool(number: int, context: SpawnContext, parent: Connection) -> ProcessPool
     except OSError as fault:
         reason = (fault.strerror or str(fault)).lower()
         raise ValueError(f"worker processes need semaphores: {reason}; expected a /dev/shm to write to") from None
+
+
+def _kill_late() -> None:
+    """Kill the workers that do not end by themselves: one whose library holds the GIL does not see the closed pipe."""
+    children = multiprocessing.active_children()
+    patience = Patience(END_TIMEOUT, *(child.pid for child in children))
+    while any(child.is_alive() for child in children) and not patience.over:
+        time.sleep(POLL)
+    for child in children:
+        child.kill()
 
 
 def _end_with(parent: Connection) -> None:

@@ -4,34 +4,41 @@ ArduPilot sends a servo packet and waits for the state after that step, so each 
 waits for the next one. Compiled code does this (`exchange`) as long as the packets arrive in order and within 0.2 s.
 """
 
-import socket
 import time
 from collections.abc import Callable
+from functools import partial
+
+import numpy as np
 
 from lapwing.cosim.diagram.compiled_block import InputRing
 from lapwing.kernels import math
-from lapwing.services.ardupilot.exchange import OUTPUTS, PWM_MAX, PWM_MIN, ArduPilotExchange
-from lapwing.services.ardupilot.frame_sequence import Frame, FrameSequence
+from lapwing.services.ardupilot.exchange import OUTPUTS, ArduPilotExchange, Samples
 from lapwing.services.ardupilot.modes import CONVENTIONS
-from lapwing.services.ardupilot.resolve import LOOP_RATE, NAME, ArduPilotSetup
-from lapwing.services.ardupilot.sample import Samples
-from lapwing.services.ardupilot.servo_packet import ServoPacket, decode, throttle
+from lapwing.services.ardupilot.resolve import LOOP_RATE, NAME, ArduPilotConfig
+from lapwing.services.ardupilot.servo_packet import (
+    ANY,
+    RESENT,
+    RESTARTED,
+    ServoPacket,
+    decode,
+    frames_ahead,
+    throttle,
+)
 from lapwing.services.common import ports
-from lapwing.services.common.firmware.datagrams import DatagramSocket, bound_socket
-from lapwing.services.common.firmware.exchange import INVALID, LAST_START, POLL, SEND, Shared, empty_ring
-from lapwing.services.common.firmware.link import FirmwareOutput, LinkReport, Read, Waits
+from lapwing.services.common.firmware.exchange import INVALID, LAST_START, SEND, Shared, empty_ring
+from lapwing.services.common.firmware.firmware_config import FirmwareConfig
+from lapwing.services.common.firmware.link import Read
+from lapwing.services.common.firmware.mavlink_link import MavlinkLink
 from lapwing.services.common.firmware.mavlink_transport import TcpTransport
-from lapwing.services.common.firmware.mission_client import MissionClient, poll_flight
-from lapwing.services.common.firmware.mission_messages import mission_items, mission_messages
-from lapwing.services.common.firmware.program import Program, ProgramLink
-from lapwing.services.common.firmware.setup import FirmwareSetup, first_free
+from lapwing.services.common.firmware.mission_client import MissionClient
+from lapwing.services.common.firmware.program import TCP, UDP, OwnPort
+from lapwing.services.common.firmware.repeatable import Turns
+from lapwing.services.common.firmware.service import firmware_service
 from lapwing.services.common.ports import AirspeedReading, DistanceReading, ImuReading
 
-PORT, MAVLINK_PORT, STRIDE = 9002, 5760, 10
-INSTANCES = 100
+PORT, MAVLINK_PORT, RC_PORT, STRIDE = 9002, 5760, 5501, 10
 PEER_TIMEOUT = 2.0  # [s] without an answer; after it, another sender is a restarted firmware
 PARAMETERS_FILE = "lapwing.parm"
-PARAMETERS = {"AUTO_OPTIONS": 3.0, "SIM_SPEEDUP": 1000.0}  # arm and take off in AUTO; no time control
 EVERY = 0.2  # [s] between two updates of the simulated sensors
 SAG = 0.7  # [V] that ArduPilot subtracts at full throttle
 
@@ -42,7 +49,7 @@ class SimulatedSensors:
     The JSON interface does not reach them. Sources: ArduPilot, SITL.cpp and SITL_State_common.cpp.
     """
 
-    def __init__(self, own: ArduPilotSetup, client: MissionClient):
+    def __init__(self, own: ArduPilotConfig, client: MissionClient):
         """Store the adapter's values and the client."""
         self._own, self._client = own, client
         self._fix = True  # as ArduPilot starts
@@ -57,31 +64,28 @@ class SimulatedSensors:
             self._fix = fix
             self._client.send_parameter("SIM_GPS_DISABLE", float(not fix))  # name up to version 4.5
             self._client.send_parameter("SIM_GPS1_ENABLE", float(fix))
-        if math.isfinite((battery := read(ports.BATTERY)).charge):
-            throttle = math.total(motors) / len(motors)
-            self._client.send_parameter("SIM_BATT_VOLTAGE", battery.voltage + SAG * throttle)
+        sag = SAG * math.total(motors) / len(motors)
+        self._client.send_parameter("SIM_BATT_VOLTAGE", read(ports.BATTERY).voltage + sag)
 
 
-class ArduPilotLink(ProgramLink):
+class ArduPilotLink(MavlinkLink):
     """Connection to one ArduPilot SITL."""
 
-    outputs = OUTPUTS
+    outputs, CONVENTIONS = OUTPUTS, CONVENTIONS
+    INSTANCES, OWN_LOGS = 100, "logs/*.BIN"
+    OWN_PORTS = (*(OwnPort(TCP, MAVLINK_PORT + k, STRIDE) for k in (0, 2, 3)), OwnPort(UDP, RC_PORT, STRIDE))
 
-    def __init__(self, setup: FirmwareSetup) -> None:
+    _was_resent = False  # a frame was resent since the last answer
+
+    def __init__(self, config: FirmwareConfig) -> None:
         """Store the configuration."""
-        self._setup = setup
-        self._own: ArduPilotSetup = setup.own
-        self.report = LinkReport("ardupilot")
-        self._sequence, self._socket = FrameSequence(), DatagramSocket()
-        self._client: MissionClient | None = None
-        self._simulated: SimulatedSensors | None = None
-        self._packet: ServoPacket | None = None
-        self._was_resent = False  # a frame was resent since the last answer
+        super().__init__(config)
+        self._next = np.full(1, ANY)  # count of the next frame; compiled code increments it for each frame in order
 
     @property
     def address(self) -> tuple[str, int]:
         """Host and port of this link's lock-step socket."""
-        return self._setup.host, self._setup.port_at(PORT, STRIDE)
+        return self._config.host, self._config.port_at(PORT, STRIDE)
 
     def exchange(self, shared: Shared, ring: Callable[[str], InputRing]) -> ArduPilotExchange:
         """Return the parameters of the compiled exchange."""
@@ -97,139 +101,118 @@ class ArduPilotLink(ProgramLink):
             bool(own.range_port),
             own.airspeed,
         )
-        return ArduPilotExchange(shared, samples, self._socket.memory, self._sequence.next)
+        return ArduPilotExchange(shared, samples, self._socket.memory, self._next)
 
-    def open(self, waits: Waits) -> None:
-        """Start ArduPilot or wait for it, and receive its first servo packet."""
-        self._setup, bound = first_free(self._setup, INSTANCES, _claim)
-        self._socket.attach(bound)
-        setup = self._setup
-        items = mission_items(setup.plan)
-        parameters = {**PARAMETERS, **setup.parameters} if items else dict(setup.parameters)
-        if setup.command:
-            text = "".join(f"{name} {value:.9g}\n" for name, value in {**PARAMETERS, **parameters}.items())
-            files = {PARAMETERS_FILE: setup.parameter_text + "\n" + text}
-            self._program = Program(setup, self._arguments(), files)
-            parameters = {}
-        port = MAVLINK_PORT + STRIDE * setup.instance
-        self._client = MissionClient(
-            TcpTransport(setup.host, port), CONVENTIONS, mission_messages(items, self._own.datum), parameters
-        )
-        self._simulated = SimulatedSensors(self._own, self._client)
-        patience = self._patience(setup.start_timeout)
-        while self._packet is None:
-            waits(f"ardupilot on udp {self.address[0]}:{self.address[1]}")
-            self._client.read()  # ArduPilot waits for a connection before it starts
-            self._process(self._socket.receive())
-            self._check(patience, "no servo packet", "start arducopter with --model JSON:127.0.0.1")
+    def close(self) -> None:
+        """End the program and close the connections."""
+        if self._transport:
+            self._transport.close()  # first: the port of the end that closes first stays in use for a while
+        super().close()
 
-    def _arguments(self) -> list[str]:
-        """Return the arguments of the program that the scene does not set."""
-        home, instance = self._own.datum.home, self._setup.instance
-        position = f"{home.latitude_deg:.9f},{home.longitude_deg:.9f},{home.height:.3f},0"
+    def _claim(self) -> None:
+        self._socket.attach(self._bound(UDP, self.address[1]))
+        self._transport = TcpTransport(self._config.host, MAVLINK_PORT + STRIDE * (self._config.instance or 0))
+
+    def _peer(self) -> tuple[int, int] | None:
+        port = self._socket.peer_port
+        return (UDP, port) if port else None
+
+    def _run(self, parameters: dict[str, float]) -> None:
+        """Start the program, with those arguments that the scene does not set."""
+        home, config = self._own.datum.home, self._config
         defaults = {
-            "--model": f"JSON:{self._setup.host}",
-            "--home": position,
-            "--instance": str(instance),
-            "--sim-port-out": str(self.address[1]) if self._setup.port else "",
+            "--model": f"JSON:{config.host}",
+            "--home": f"{home.latitude_deg:.9f},{home.longitude_deg:.9f},{home.height:.3f},0",
+            "--instance": str(config.instance),
+            "--sim-port-out": str(self.address[1]) if config.port else "",
             "--defaults": PARAMETERS_FILE,
         }
-        arguments = set(self._setup.command)
-        return [text for name, value in defaults.items() if value and name not in arguments for text in (name, value)]
+        own = [
+            text for name, value in defaults.items() if value and name not in config.command for text in (name, value)
+        ]
+        text = "".join(f"{name} {value:.9g}\n" for name, value in parameters.items())
+        peers = (MAVLINK_PORT + STRIDE * (config.instance or 0),)
+        turns = Turns("s", self.address[1], config.period * config.interval_ns, peers)
+        self._start(own, {PARAMETERS_FILE: text}, turns=turns)
 
-    def handle_call(self, tick: int, reason: int, number: int, read: Read, waits: Waits) -> FirmwareOutput | None:
-        """Handle a call from the compiled exchange; see `ExchangeLink`."""
-        self._time = tick * self._setup.interval
+    def _connect(self) -> None:
+        """Receive the first servo packet."""
+        self._simulated = SimulatedSensors(self._own, self._client)
+        timeout = self._config.start_timeout
+        for _ in self._attempts("ardupilot on udp {}:{}".format(*self.address), timeout):
+            self._client.read()  # ArduPilot waits for a connection before it starts
+            if self._process(self._socket.receive()):
+                self._take_turns("linked")
+                return
+        advice = "check that it runs" if self._program else "start arducopter with --model JSON:127.0.0.1"
+        self._time_out(f"no servo packet for {timeout:g} s", advice)
+
+    def _handle(self, tick: int, reason: int, number: int, read: Read) -> None:
         if reason == INVALID:
             raise ValueError("the state of the vehicle is not finite")
         if reason == SEND:
             self._send()
-        elif reason == POLL:
-            return self._poll(tick, read)
         else:
-            self._await(number, waits)
-        return None
+            self._await(number)
 
-    def _poll(self, tick: int, read: Read) -> FirmwareOutput:
-        """Poll the MAVLink link. Return the state of the flight."""
-        assert self._client is not None
-        assert self._simulated is not None
-        result = poll_flight(NAME, self._client, self._time)
-        self.report.version = self._client.version
+    def _update(self, read: Read) -> None:
         self._simulated.update(self._time, read, tuple(self._shared.outputs))
-        self._shared.next_poll[0] = max(tick + 1, self._client.next_poll_tick(self._setup.interval))
-        return result
 
-    def _await(self, size: int, waits: Waits) -> None:
+    def _await(self, size: int) -> None:
         """Wait for the next servo packet, after compiled code received `size` bytes that were not this packet.
 
         A resent frame is answered again only if no other packet follows it: ArduPilot may have sent it before the
         answer arrived, and would use a second answer for its next frame. All later outputs would then be a step late.
         """
-        self._packet, self._was_resent = None, False
-        self._process(size)
-        patience = self._patience(self._setup.step_timeout)
-        while self._packet is None:
-            waits("ardupilot")
-            self._check(patience, "no servo packet", "check that it runs and that its steps are not blocked")
-            size = self._socket.receive()
-            self._process(size)
+        self._was_resent, timeout = False, self._config.step_timeout
+        for _ in self._attempts("ardupilot", timeout):
+            if packet := self._process(size):
+                self._shared.outputs[:] = [throttle(pwm) for pwm in packet.pwm[:OUTPUTS]]
+                return
             if size < 0 and self._was_resent:
                 self._was_resent = False
                 self._send()
-            elif size < 0 and self._client:
+            elif size < 0 and not self.in_turns:
                 self._client.read()  # ArduPilot waits for a connection before it starts again
-        self._shared.outputs[:] = [throttle(pwm, PWM_MIN, PWM_MAX) for pwm in self._packet.pwm[:OUTPUTS]]
-
-    def close(self) -> None:
-        """Close the connections and end the program."""
-        if self._client:
-            self._client.close()
-        self._socket.close()
-        if self._program:
-            self._program.close()
-        self._program = self._client = None
+            size = self._socket.receive()
+        self._time_out(f"no servo packet for {timeout:g} s", "check that it runs and that its steps are not blocked")
 
     def _send(self) -> None:
         """Send the last answer."""
         if reason := self._socket.send():
             self.report.note(f"cannot send to ArduPilot ({reason})")
 
-    def _process(self, size: int) -> None:
-        """Process a datagram of `size` bytes; negative if none has arrived."""
-        link = self._socket
+    def _process(self, size: int) -> ServoPacket | None:
+        """Process a datagram of `size` bytes; negative if none has arrived. Return a servo packet that is new."""
+        link, report = self._socket, self.report
         if size < 0:  # none, or the firmware's port is closed
-            return
+            return None
         try:
-            packet = decode(link.datagram(size))
+            packet = decode(link.data(size))
         except ValueError as error:
-            self._reject(f"packet from {link.sender} is not a servo packet: {error}")
-            return
-        if link.has_peer and not link.knows_sender:
+            report.reject(f"packet from {link.sender} is not a servo packet: {error}")
+            return None
+        restarted = bool(link.peer_port) and not link.knows_sender
+        if restarted:
             if time.monotonic() < self._shared.seconds[LAST_START] + PEER_TIMEOUT:
-                self._reject(f"another ArduPilot sends from {link.sender}")
-                return
-            self._sequence.restart()
+                report.reject(f"another ArduPilot sends from {link.sender}")
+                return None
+            self._next[0] = ANY
         link.answer_sender()
-        meaning = self._sequence.receive(packet.frame_count)
-        self.report.resent, self.report.missed = self._sequence.resent, self._sequence.skipped
-        if self._sequence.restarts > self.report.reconnected and self._client:
+        ahead = frames_ahead(packet.frame_count, int(self._next[0]))
+        self._next[0] = packet.frame_count + 1
+        if ahead == RESENT:
+            report.resent += 1
+            self._was_resent = True
+            return None
+        report.missed += max(ahead, 0)
+        if restarted or ahead == RESTARTED:
+            report.reconnected += 1
             self._client.restart()
             self._simulated = SimulatedSensors(self._own, self._client)
-        self.report.reconnected = self._sequence.restarts
-        if meaning is Frame.RESENT:
-            self._was_resent = True
-            return
         if packet.frame_rate <= LOOP_RATE:  # a rate that ArduPilot cannot keep
-            self.report.note(f"SIM_RATE_HZ is {packet.frame_rate}; set it above the loop rate of {LOOP_RATE} Hz")
-        self._packet = packet
-
-    def _reject(self, text: str) -> None:
-        self.report.rejected += 1
-        self.report.note(text)
+            report.note(f"SIM_RATE_HZ is {packet.frame_rate}; set it above the loop rate of {LOOP_RATE} Hz")
+        return packet
 
 
-def _claim(setup: FirmwareSetup) -> socket.socket:
-    """Open the port of an instance. Raise FirmwareError if it is in use."""
-    advice = "stop the other simulator, or set autopilot.instance"
-    return bound_socket(NAME, setup.host, setup.port_at(PORT, STRIDE), advice)
+create = partial(firmware_service, name=NAME, link=ArduPilotLink)

@@ -9,11 +9,9 @@ NAMES = {
     25: "system identification", 26: "autorotate", 27: "auto return", 28: "turtle",
 }  # fmt: skip
 AUTO = 3.0
+PARAMETERS = {"AUTO_OPTIONS": 3.0, "SIM_SPEEDUP": 1000.0}  # arm and take off in AUTO; no time control
 
-
-def mode_name(custom_mode: int) -> str:
-    """Return the name of a heartbeat's custom_mode."""
-    return NAMES.get(custom_mode, f"mode {custom_mode}")
-
-
-CONVENTIONS = Conventions((AUTO, 0.0), home_first=True, open_value=0.0, bytewise=False, mode_name=mode_name)
+CONVENTIONS = Conventions(
+    (AUTO, 0.0), home_first=True, open_value=0.0, bytewise=False,
+    mode_name=lambda number: NAMES.get(number, f"mode {number}"), parameters=PARAMETERS,
+)  # fmt: skip

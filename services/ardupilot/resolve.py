@@ -8,20 +8,27 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vector import Vec3
 from lapwing.services.ardupilot.schema import ArduPilot
 from lapwing.services.common import ports
-from lapwing.services.common.communication_schema import Communication
-from lapwing.services.common.environment_schema import environment
+from lapwing.services.common.firmware.firmware_config import firmware_config, fleet, latencies
 from lapwing.services.common.firmware.mission import with_mission
 from lapwing.services.common.firmware.schema import firmware_of
-from lapwing.services.common.firmware.setup import firmware_config, fleet
 from lapwing.services.common.mavlink.geo_coordinates import Datum
-from lapwing.services.common.vehicle_schema import gravity, start_height
+from lapwing.services.common.schemas.communication_schema import Communication
+from lapwing.services.common.schemas.environment_schema import environment
+from lapwing.services.common.schemas.vehicle_schema import gravity, start_height
 
 __all__ = ["fleet", "resolve"]
 NAME = "ardupilot"
+SIMULATED = {  # parameters [ms] of the delay of ArduPilot's model of each sensor, and of that which its filter expects
+    ports.GPS: ("SIM_GPS1_LAG_MS", "GPS1_DELAY_MS", "SIM_GPS_LAG_MS", "GPS_DELAY_MS"),  # the last two up to 4.5
+    ports.BAROMETER: ("SIM_BARO_DELAY", "EK3_HGT_DELAY"),
+    ports.MAGNETOMETER: ("SIM_MAG_DELAY",),
+}
+DELAY_MIN = 1.0  # [ms] GPS1_DELAY_MS, where 0 stands for the delay that ArduPilot expects of a kind of receiver
+VOLTAGE_AND_CURRENT = 4.0  # BATT_MONITOR
 LOOP_RATE = 400  # [Hz] of ArduCopter's main loop, which the rate of the exchange must exceed
 
 
-class ArduPilotSetup(NamedTuple):
+class ArduPilotConfig(NamedTuple):
     """Resolved values of the adapter."""
 
     datum: Datum  # origin of the mission
@@ -31,6 +38,7 @@ class ArduPilotSetup(NamedTuple):
     range_port: str  # port of the distance sensor; "": none
     airspeed: bool
     gps: bool  # the scene has a receiver, whose outages are sent to ArduPilot
+    parameters: dict[str, float]  # ArduPilot parameters that describe the scene's sensors and battery
 
 
 def resolve(scene: Scene) -> ServiceConfig | None:
@@ -51,7 +59,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         raise ConfigError("ardupilot.inertial", '"sensors" needs an IMU', "[sensors.imu] too")
     distance = next((name for name in (ports.RANGEFINDER, ports.SONAR) if name in sensors), "")
     home = environment(scene).home
-    own = ArduPilotSetup(
+    own = ArduPilotConfig(
         Datum(home, start_height(scene), start_height(scene)),
         (0.0, 0.0, -gravity(scene)),
         exchange.rate,
@@ -59,8 +67,22 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         distance,
         ports.AIRSPEED in sensors,
         ports.GPS in sensors,
+        sensor_parameters(scene),
     )
     inputs = [ports.TRUTH, *([ports.IMU] if imu else []), *([distance] if distance else [])]
     inputs += [ports.AIRSPEED] if own.airspeed else []
     inputs += [ports.GPS] if own.gps else []
     return with_mission(scene, ArduPilot, firmware_config(scene, tuple(inputs), 1, own))
+
+
+def sensor_parameters(scene: Scene) -> dict[str, float]:
+    """Return the ArduPilot parameters that describe the scene: delays and rate of its sensors.
+
+    BATT_MONITOR = 4: ArduPilot measures the plant's battery, and its log has the voltage.
+    """
+    result = {"BATT_MONITOR": VOLTAGE_AND_CURRENT, **latencies(scene, SIMULATED)}
+    if ports.GPS in scene.tables("sensors"):
+        rate = scene.lookup(f"sensors.{ports.GPS}.rate")
+        result |= {"SIM_GPS1_HZ": rate, "SIM_GPS_HZ": rate}
+        result |= {name: max(result[name], DELAY_MIN) for name in ("GPS1_DELAY_MS", "GPS_DELAY_MS")}
+    return result

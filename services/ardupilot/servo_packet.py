@@ -1,7 +1,8 @@
-"""Servo packets of ArduPilot's JSON interface.
+"""Servo packets of ArduPilot's JSON interface, and the sequence of their frame counts.
 
 A packet is little-endian: magic, rate [Hz], frame count, and 16 pulse widths [us], or 32 with SERVO_32_ENABLE.
-Source: ArduPilot, libraries/SITL/examples/JSON/readme.md.
+Source: ArduPilot, libraries/SITL/examples/JSON/readme.md. ArduPilot sends a frame again, with the same count, if its
+answer does not arrive within about a second. Such a frame is answered but does not step the plant.
 """
 
 import struct
@@ -13,6 +14,9 @@ MAGIC_16, MAGIC_32 = 18458, 29569
 _HEAD = struct.Struct("<HHI")
 _LAYOUTS = {MAGIC_16: struct.Struct("<HHI16H"), MAGIC_32: struct.Struct("<HHI32H")}
 PULSE_MAX = 3000  # [us] longest plausible pulse; 0: the channel is unused
+PWM_MIN, PWM_MAX = 1000.0, 2000.0  # [us] MOT_PWM_MIN and MOT_PWM_MAX
+ANY = -1  # expected count before the first frame of a program
+RESENT, RESTARTED = -1, -2  # the last frame again; a lower count: the program has restarted
 
 
 class ServoPacket(NamedTuple):
@@ -46,6 +50,12 @@ def decode(data: bytes) -> ServoPacket:
 
 
 @always_inline
-def throttle(pwm: int, low: float, high: float) -> float:
-    """Return the fraction, 0 to 1, of a pulse width [us]; `low` and `high` [us] are MOT_PWM_MIN and MOT_PWM_MAX."""
-    return min(max((pwm - low) / (high - low), 0.0), 1.0)
+def throttle(pwm: int) -> float:
+    """Return the fraction, 0 to 1, of a pulse width [us]."""
+    return min(max((pwm - PWM_MIN) / (PWM_MAX - PWM_MIN), 0.0), 1.0)
+
+
+def frames_ahead(count: int, expected: int) -> int:
+    """Return by how many frames a count is ahead of the expected one: RESENT, RESTARTED, or the frames skipped."""
+    ahead = 0 if expected == ANY else (count - expected) & 0xFFFFFFFF
+    return RESENT if ahead == 0xFFFFFFFF else RESTARTED if ahead >= 1 << 31 else ahead

@@ -1,4 +1,4 @@
-"""State of the vehicle as a JSON message for ArduPilot.
+"""State of the vehicle as a JSON message for ArduPilot, written by compiled code.
 
 ArduPilot reads the message without a JSON parser: no space may follow a colon, and a key must not be the beginning of
 an earlier one. Position and velocity are north, east, down; body vectors are forward, right, down; the quaternion
@@ -11,9 +11,13 @@ import numpy as np
 
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
 from lapwing.dynamics.vector import ZERO, Vec3
-from lapwing.kernels import always_inline, math
-from lapwing.services.ardupilot.decimal_text import LIMIT, write_number, write_text
+from lapwing.kernels import always_inline, math, noinline
 from lapwing.services.common.mavlink import frames
+
+LIMIT = 9e8  # numbers below it have up to 10 decimals in an integer of 64 bits
+INVALID = -1
+_ZERO, _MINUS, _POINT = b"0-."
+_SCALES = tuple(10**k for k in range(11))
 
 
 def _text(text: str) -> np.ndarray:
@@ -27,8 +31,6 @@ _RANGE, _AFTER_RANGE, _AIRSPEED = _text(',"rng_'), _text('":'), _text(',"airspee
 _BATTERY, _CURRENT, _CLOSE, _BRACE = _text(',"battery":{"voltage":'), _text(',"current":'), _text("]"), _text("}")
 _swap_world, _swap_body = always_inline(frames.swap_world), always_inline(frames.swap_body)
 _swap_attitude = always_inline(frames.swap_attitude)
-_NANO, _TENTH_NANO, _MICRO = 10**9, 10**10, 10**6
-INVALID = -1
 
 
 class VehicleState(NamedTuple):
@@ -50,8 +52,65 @@ class Extras(NamedTuple):
     current: float = math.nan  # [A] drawn
 
 
+@noinline
+def write_number(out: Any, at: int, value: float, decimals: int) -> int:
+    """Write a number, rounded to `decimals` decimals, without zeros at its end; its absolute value is below LIMIT.
+
+    Args:
+        out: buffer of bytes.
+        at: index of the first byte.
+        value: number to write.
+        decimals: at most 10.
+
+    Returns:
+        The index after the number.
+    """
+    scale = _SCALES[decimals]
+    n = int(math.fabs(value) * scale + 0.5)
+    if value < 0.0 and n > 0:
+        out[at] = _MINUS
+        at += 1
+    whole, rest = n // scale, n % scale
+    digits, power = 1, 10
+    while whole >= power:
+        digits, power = digits + 1, power * 10
+    for k in range(digits):
+        out[at + digits - 1 - k] = _ZERO + whole % 10
+        whole //= 10
+    at += digits
+    if rest == 0:
+        return at
+    out[at] = _POINT
+    at += 1 + decimals
+    for k in range(decimals):
+        out[at - 1 - k] = _ZERO + rest % 10
+        rest //= 10
+    while out[at - 1] == _ZERO:
+        at -= 1
+    return at
+
+
 @always_inline
-def _fits(values: Any) -> bool:
+def _write_text(out: Any, at: int, text: Any) -> int:
+    for k in range(len(text)):
+        out[at + k] = text[k]
+    return at + len(text)
+
+
+@always_inline
+def _write(out: Any, at: int, text: Any, values: Any, decimals: int) -> int:
+    """Write a text, and after it numbers separated by commas."""
+    at, first = _write_text(out, at, text), True
+    for value in values:
+        if not first:
+            at = _write_text(out, at, _COMMA)
+        first = False
+        at = write_number(out, at, value, decimals)
+    return at
+
+
+@always_inline
+def _is_valid(values: Any) -> bool:
     """Return True if all absolute values are below LIMIT."""
     result = True
     for value in values:
@@ -60,25 +119,11 @@ def _fits(values: Any) -> bool:
 
 
 @always_inline
-def _write_numbers(out: Any, at: int, values: Any) -> int:
-    """Write numbers with nine decimals, separated by commas."""
-    first = True
-    for value in values:
-        if not first:
-            at = write_text(out, at, _COMMA)
-        first = False
-        at = write_number(out, at, value, 9, _NANO)
-    return at
-
-
-@always_inline
 def write_state(out: Any, time: float, state: VehicleState, extras: Extras) -> int:
-    """Write the message into `out`.
-
-    Numbers have 9 decimals, the time 10, optional fields 6.
+    """Write the message into `out`. Numbers have 9 decimals, the time 10, optional fields 6.
 
     Args:
-        out: bytes, shape (2048,).
+        out: bytes, at least 2048.
         time: [s] of the simulation.
         state: state of the vehicle.
         extras: optional fields.
@@ -89,28 +134,23 @@ def write_state(out: Any, time: float, state: VehicleState, extras: Extras) -> i
     position, velocity = _swap_world(state.position_world), _swap_world(state.velocity_world)
     gyro, force = _swap_body(state.omega_body), _swap_body(state.specific_force_body)
     quaternion = _swap_attitude(state.attitude)
-    if not _fits((time, *gyro, *force, *position, *quaternion, *velocity)):
+    if not _is_valid((time, *gyro, *force, *position, *quaternion, *velocity)):
         return INVALID
-    at = write_number(out, write_text(out, 0, _TIME), time, 10, _TENTH_NANO)
-    at = _write_numbers(out, write_text(out, at, _GYRO), gyro)
-    at = _write_numbers(out, write_text(out, at, _FORCE), force)
-    at = _write_numbers(out, write_text(out, at, _POSITION), position)
-    at = _write_numbers(out, write_text(out, at, _QUATERNION), quaternion)
-    at = write_text(out, _write_numbers(out, write_text(out, at, _VELOCITY), velocity), _CLOSE)
-    return write_text(out, _write_optional(out, at, extras), _END)
-
-
-@always_inline
-def _write_optional(out: Any, at: int, extras: Extras) -> int:
-    """Write the optional fields, each after a comma."""
+    at = _write(out, 0, _TIME, (time,), 10)
+    at = _write(out, at, _GYRO, gyro, 9)
+    at = _write(out, at, _FORCE, force, 9)
+    at = _write(out, at, _POSITION, position, 9)
+    at = _write(out, at, _QUATERNION, quaternion, 9)
+    at = _write(out, at, _VELOCITY, velocity, 9)
+    at = _write_text(out, at, _CLOSE)
     for k in range(len(extras.ranges)):
         if math.fabs(extras.ranges[k]) < LIMIT:
-            at = write_number(out, write_text(out, at, _RANGE), k + 1.0, 0, 1)
-            at = write_number(out, write_text(out, at, _AFTER_RANGE), extras.ranges[k], 6, _MICRO)
+            at = _write(out, at, _RANGE, (k + 1.0,), 0)
+            at = _write(out, at, _AFTER_RANGE, (extras.ranges[k],), 6)
     if math.fabs(extras.airspeed) < LIMIT:
-        at = write_number(out, write_text(out, at, _AIRSPEED), extras.airspeed, 6, _MICRO)
-    if math.fabs(extras.voltage) < LIMIT and math.fabs(extras.current) < LIMIT:
-        at = write_number(out, write_text(out, at, _BATTERY), extras.voltage, 6, _MICRO)
-        at = write_number(out, write_text(out, at, _CURRENT), extras.current, 6, _MICRO)
-        at = write_text(out, at, _BRACE)
-    return at
+        at = _write(out, at, _AIRSPEED, (extras.airspeed,), 6)
+    if _is_valid((extras.voltage, extras.current)):
+        at = _write(out, at, _BATTERY, (extras.voltage,), 6)
+        at = _write(out, at, _CURRENT, (extras.current,), 6)
+        at = _write_text(out, at, _BRACE)
+    return _write_text(out, at, _END)

@@ -3,11 +3,12 @@
 from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
-from lapwing.kernels import always_inline, python_function
+from lapwing.kernels import always_inline, math, python_function
 from lapwing.kernels.cell import read
 from lapwing.services.autopilot import control, motor_failure
 from lapwing.services.autopilot.commander_wakeup import battery_warning
-from lapwing.services.autopilot.land_detector import FLYING, ON_GROUND
+from lapwing.services.autopilot.land_detector import FLYING, LANDED, ON_GROUND
+from lapwing.services.autopilot.mixer import scale_all, zero_thrust
 from lapwing.services.common.ports import AutopilotStatus, MotorCommand, Setpoint, StateEstimate
 
 ORDER, FLIGHT = "order", "flight"  # ports within the autopilot
@@ -66,6 +67,9 @@ class StepStart(NamedTuple):
     estimate: StateEstimate
     order: ControllerInput
     setpoint: Setpoint
+    landed_state: int  # ON_GROUND, FLYING or LANDED
+    flying: bool
+    power: float  # fraction of the commanded thrust that the motors get
     restarts: bool  # the controller is reset at this tick
     failure_detector: motor_failure.State
     still_from: int  # [tick]
@@ -75,46 +79,56 @@ class StepStart(NamedTuple):
 @always_inline
 def start_step(p: Controller, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> StepStart:
     """Read the inputs at `tick`; `s` is the state of a controller block."""
-    order, battery = inputs[1].value, inputs[2]
-    setpoint = inputs[3].value if order.follow else order.setpoint
+    order, battery, landing = inputs[1].value, inputs[2], inputs[3].value
     restarts = order.restart_at == tick
     detector, still_from = s.failure_detector, s.still_from
     if restarts:
         detector, still_from = motor_failure.start(p.failure_detector.value), tick + p.bounce
     charge = battery.value.charge if battery.due else s.charge
-    return StepStart(inputs[0].value, order, setpoint, restarts, detector, still_from, charge)
+    state = landing.landed_state
+    return StepStart(
+        inputs[0].value, order, landing.setpoint, state, state == FLYING, landing.power,
+        restarts, detector, still_from, charge,
+    )  # fmt: skip
+
+
+@always_inline
+def motors_off(law: control.Parameters, setpoint: Setpoint) -> control.Command:
+    """Return the command that stops the motors."""
+    off = zero_thrust(law.shares[0])
+    return control.Command(off, off, 0.0, 0.0, setpoint.yaw)
 
 
 @always_inline
 def block_outputs(
-    p: Controller, i: StepStart, landed_state: int, c: control.Command
+    p: Controller, i: StepStart, c: control.Command
 ) -> tuple[motor_failure.State, tuple[MotorCommand, Setpoint, AutopilotStatus, Flight]]:
     """Return the new state of the motor failure detector and the outputs of the block.
 
     Args:
         p: parameters of the block.
         i: start of the step.
-        landed_state: ON_GROUND, FLYING or LANDED.
         c: output of the control law.
     """
     order, setpoint = i.order, i.setpoint
     height = i.estimate.position_world[2] - p.law.value.resting_height
-    detector = motor_failure.step(
-        p.failure_detector.value, i.failure_detector, p.interval, i.estimate, height, c.thrust
-    )
-    flying = landed_state == FLYING
+    thrust, voltage = c.thrust, c.motor_voltage
+    if i.power < 1.0:
+        thrust, voltage = scale_all(i.power, thrust), scale_all(math.sqrt(i.power), voltage)
+    detector = motor_failure.step(p.failure_detector.value, i.failure_detector, p.interval, i.estimate, height, thrust)
+    flying = i.flying
     armed = flying if order.follow else order.armed
-    finished = (c.finished and setpoint.final) if order.follow else order.finished
+    finished = (i.landed_state == LANDED and setpoint.final) if order.follow else order.finished
     released = order.released or (order.follow and setpoint.release and not flying)
     attitude_reference = (c.roll_reference, c.pitch_reference, c.yaw_reference)
     warning = battery_warning(p.thresholds.value, i.charge)
     return detector, (
-        MotorCommand(c.motor_voltage, flying, c.thrust, attitude_reference),
+        MotorCommand(voltage, flying, thrust, attitude_reference),
         setpoint,
         AutopilotStatus(
             setpoint.phase, order.status_text_id, armed, not flying, finished, warning, detector.failed, released
         ),
-        Flight(landed_state, i.still_from, detector.failed),
+        Flight(i.landed_state, i.still_from, detector.failed),
     )
 
 
@@ -124,8 +138,9 @@ def step(
 ) -> tuple[ControllerState, tuple, int]:
     """Compute the motor command at `tick`."""
     i = start_step(p, s, tick, inputs)
-    control_state = control.START if i.restarts else s.control
-    failed = i.failure_detector.failed
-    control_state, c = control.step(p.law.value, control_state, p.interval, i.estimate, i.setpoint, failed)
-    detector, outputs = block_outputs(p, i, control_state.landed_state.name, c)
+    control_state, c = control.START, motors_off(p.law.value, i.setpoint)
+    if i.flying:
+        before, failed = control.START if i.restarts else s.control, i.failure_detector.failed
+        control_state, c = control.step(p.law.value, before, p.interval, i.estimate, i.setpoint, failed)
+    detector, outputs = block_outputs(p, i, c)
     return ControllerState(control_state, detector, i.still_from, i.charge), outputs, CONTINUE

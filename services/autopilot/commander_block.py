@@ -13,7 +13,7 @@ from lapwing.kernels import math
 from lapwing.kernels.cell import Cell, read, write
 from lapwing.messages import CommandAcks, header
 from lapwing.messages import topics as topic
-from lapwing.services.autopilot import motor_failure
+from lapwing.services.autopilot import land_detector, motor_failure
 from lapwing.services.autopilot.allocation import tables_for_failures
 from lapwing.services.autopilot.block import FLIGHT, NO_TRAJECTORY, ORDER, ControllerInput, Flight
 from lapwing.services.autopilot.commander.commander import Commander
@@ -25,11 +25,11 @@ from lapwing.services.autopilot.controller_parameters import build, lift
 from lapwing.services.autopilot.failure_injection.injection_blocks import Injection
 from lapwing.services.autopilot.failure_injection.motor_failures import DirectMotorControl
 from lapwing.services.autopilot.land_detector import LANDED, ON_GROUND
+from lapwing.services.autopilot.landing_block import LANDING, Landing
 from lapwing.services.autopilot.mixer import airmode
-from lapwing.services.autopilot.px4 import law as px4_law
-from lapwing.services.autopilot.service_config import AutopilotSetup
+from lapwing.services.autopilot.service_config import AutopilotConfig
 from lapwing.services.common import ports
-from lapwing.services.common.autopilot_parameters import PX4_CASCADE, with_gains
+from lapwing.services.common.autopilot_parameters import with_gains
 from lapwing.services.common.failure_types import SOUND
 from lapwing.services.common.operator_inbox import merge_commands
 from lapwing.services.common.ports import ImuSelection, Setpoint
@@ -45,14 +45,14 @@ class CommanderBlock:
 
     def __init__(
         self,
-        config: AutopilotSetup,
+        config: AutopilotConfig,
         law: Cell,
         thresholds: Cell,
         detector: Cell,
         service: Service,
         operator: Operator,
         injection: Injection,
-        px4: Cell | None = None,
+        landing: Cell,
     ):
         """Create the block.
 
@@ -64,9 +64,9 @@ class CommanderBlock:
             service: receiver of the messages.
             operator: source of operator commands.
             injection: failure injection.
-            px4: cell of the parameters of PX4's cascade, if it flies.
+            landing: cell of the land detector's parameters.
         """
-        self._px4, self._detector = px4, detector
+        self._detector, self._landing = detector, landing
         no_trajectory = () if config.phases else (Port(NO_TRAJECTORY, Setpoint(), LATCHED),)
         self.outputs = (Port(ORDER, ControllerInput(), LATCHED), *no_trajectory)
         a = config.airframe
@@ -79,7 +79,7 @@ class CommanderBlock:
         hover_thrust = self._weight / (lift(a) * thrust_max)
         constants = Constants(
             table, a.resting_height, a.gravity, hover_thrust, bool(config.phases), config.operator, injection.units,
-            len(a.rotor_x), config.imus, config.has_gps,
+            len(a.rotor_x), config.imus, config.has_gps, config.height_known,
         )  # fmt: skip
         self._commander = Commander(constants)
         self._injection = injection
@@ -96,14 +96,14 @@ class CommanderBlock:
         self._acknowledgements: list[Any] = []
         self._texts: list[str] = []
 
-    def bind(self, graph: BlockDiagram) -> None:
+    def bind(self, diagram: BlockDiagram) -> None:
         """Store the diagram."""
-        self._graph = graph
-        self._interval, self._interval_ns = graph.setup.interval, graph.setup.interval_ns
+        self._diagram = diagram
+        self._interval, self._interval_ns = diagram.config.interval, diagram.config.interval_ns
 
     def on_tick(self, tick: int) -> int:
         """Step the commander at `tick`. Return the tick of the next wake-up."""
-        graph = self._graph
+        diagram = self._diagram
         if self._config.operator and tick - self._last_step > 1:
             self._skip(range(self._last_step + 1, tick))
         self._last_step = tick
@@ -113,7 +113,7 @@ class CommanderBlock:
             elapsed = self._interval * (1 if self._estimate_every_tick else ESTIMATE_POLL_TICKS)
             estimate_tick = tick
         if estimate_tick > self._estimate_tick:
-            self._estimate, self._estimate_tick = graph.latest(ports.ESTIMATE, estimate_tick), estimate_tick
+            self._estimate, self._estimate_tick = diagram.latest(ports.ESTIMATE, estimate_tick), estimate_tick
         flight = self._flight(tick)
         reference = self._reference(tick) if self._config.phases else None
         output = self._commander.step(
@@ -121,7 +121,7 @@ class CommanderBlock:
                 self._interval,
                 self._estimate,
                 elapsed,
-                graph.latest(self._battery, tick).charge if graph.has(self._battery) else math.nan,
+                diagram.latest(self._battery, tick).charge if diagram.has(self._battery) else math.nan,
                 flight.failed_motor,
                 reference,
                 self._thrust(tick),
@@ -134,9 +134,9 @@ class CommanderBlock:
         if output.parameters is not None:
             write(self._law, controller(self._config, dict(output.parameters)))
             write(self._thresholds, battery_thresholds(output.parameters))
-            write(self._detector, motor_failure.build(self._config.airframe, output.parameters))
-            if self._px4 is not None:
-                write(self._px4, px4_law.build(output.parameters, self._config.airframe))
+            detector = motor_failure.build(self._config.airframe, self._config.gyro_range, output.parameters)
+            write(self._detector, detector)
+            write(self._landing, landing_parameters(self._config, dict(output.parameters)))
         if output.faults is not None and self._injection.faults is not None:
             write(self._injection.faults, output.faults)
             self._forget_failed_motor(output.faults.motors, flight.failed_motor)
@@ -145,7 +145,7 @@ class CommanderBlock:
             write(self._injection.direct, self._direct(output.motor_voltage))
         order = self._order(tick, output, flight)
         if order != self._last_order:
-            graph.put(ORDER, tick, order)
+            diagram.put(ORDER, tick, order)
             self._last_order = order
         self._publish_acknowledgements(tick, output)
         return self._next_wakeup(tick, output.valid_for)
@@ -168,7 +168,7 @@ class CommanderBlock:
         return self._thrust(tick) > 0.0 and self._flight(tick).landed_state != LANDED
 
     def _flight(self, tick: int) -> Flight:
-        flight: Flight = self._graph.latest(FLIGHT, tick - 1) if tick > 0 else Flight()
+        flight: Flight = self._diagram.latest(FLIGHT, tick - 1) if tick > 0 else Flight()
         return flight
 
     def _forget_failed_motor(self, failures: tuple[int, ...], failed: int) -> None:
@@ -179,11 +179,13 @@ class CommanderBlock:
 
     def _imu_selection(self, tick: int) -> ImuSelection:
         voted = self._config.imus > 1 and tick > 0
-        return self._graph.latest(ports.IMU_SELECTION, tick - 1) if voted else ImuSelection()
+        return self._diagram.latest(ports.IMU_SELECTION, tick - 1) if voted else ImuSelection()
 
     def _reference(self, tick: int) -> Setpoint:
-        setpoint: Setpoint = self._graph.latest(ports.TRAJECTORY, tick)
-        return setpoint
+        """Return the trajectory's setpoint, or that of the final approach."""
+        setpoint: Setpoint = self._diagram.latest(ports.TRAJECTORY, tick)
+        landing = self._diagram.latest(LANDING, tick - 1) if tick > 0 else Landing()
+        return landing.setpoint if landing.approaches else setpoint
 
     def _direct(self, volts: tuple[float, ...] | None) -> DirectMotorControl:
         """Return the direct motor voltages within the motors' range; None: the controller's voltages."""
@@ -195,7 +197,7 @@ class CommanderBlock:
         """Return the last thrust command over the hover thrust; 1 without gravity."""
         if not self._weight > 0.0:
             return 1.0
-        thrust = math.total(self._graph.latest(ports.ACTUATORS, tick - 1).thrust) if tick > 0 else 0.0
+        thrust = math.total(self._diagram.latest(ports.ACTUATORS, tick - 1).thrust) if tick > 0 else 0.0
         return thrust * self._lift / self._weight
 
     def _commands(self, tick: int) -> tuple[Any, ...]:
@@ -226,16 +228,17 @@ class CommanderBlock:
             self._texts.clear()
 
 
-def controller(config: AutopilotSetup, values: dict[str, float]) -> Any:
+def controller(config: AutopilotConfig, values: dict[str, float]) -> Any:
     """Return the controller's parameters with the commander's parameter `values`."""
-    gains = config.gains if flies_px4_cascade(config) else with_gains(config.gains, values)
-    law = build(gains, config.airframe, config.geometric)
+    law = build(with_gains(config.gains, values), config.airframe, config.geometric)
     return law._replace(shares=tables_for_failures(law.shares, values), airmode=airmode(values))
 
 
-def flies_px4_cascade(config: AutopilotSetup) -> bool:
-    """Return True if PX4's cascade is the control law."""
-    return config.controller is not None and config.controller.name == PX4_CASCADE
+def landing_parameters(config: AutopilotConfig, values: dict[str, float]) -> land_detector.Parameters:
+    """Return the land detector's parameters with the commander's parameter `values`."""
+    a = config.airframe
+    hover_thrust = a.mass * a.gravity * len(a.rotor_x) / lift(a)
+    return land_detector.build(config.landing, a.resting_height, hover_thrust, a.gravity, values, config.height_known)
 
 
 def _status_fields(status: Status) -> Status:

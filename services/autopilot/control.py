@@ -1,20 +1,23 @@
-"""Cascaded PID controller with saturation, from setpoint to motor voltages (theory, section 4.2)."""
+"""Cascaded PID controller with saturation, from setpoint to motor voltages (theory, section 4.2).
+
+The attitude error about the body axes is that of Euler angles or of SO(3).
+"""
 
 from collections.abc import Sequence
 from typing import NamedTuple
 
-from lapwing.dynamics.lie.quaternion import to_roll_pitch_yaw
+from lapwing.dynamics.lie.quaternion import (
+    Quaternion,
+    conjugate,
+    from_roll_pitch_yaw,
+    log,
+    multiply,
+    rotate,
+    to_roll_pitch_yaw,
+)
 from lapwing.dynamics.vector import ZERO, Vec3, subtract
 from lapwing.kernels import always_inline, kernel, math
 from lapwing.services.autopilot.angle_reference import AT_REST, Angle, Smoothing, advance
-from lapwing.services.autopilot.attitude import error_by_angle, error_on_so3
-from lapwing.services.autopilot.land_detector import (
-    FLYING,
-    INITIAL_LANDED_STATE,
-    LANDED,
-    LandedState,
-    update_landed_state,
-)
 from lapwing.services.autopilot.mixer import (
     Shares,
     VirtualControls,
@@ -23,11 +26,54 @@ from lapwing.services.autopilot.mixer import (
     clamp_to_range,
     mix,
     saturate,
-    zero_thrust,
 )
 from lapwing.services.autopilot.motor import Motor, voltages
 from lapwing.services.autopilot.pid import Pid, integrate, output
 from lapwing.services.common.ports import PerRotor, Setpoint, StateEstimate
+
+
+@always_inline
+def wrap(angle: float) -> float:
+    """Return the equivalent angle in [-pi, pi] [rad]."""
+    return angle - 2.0 * math.pi * round(angle / (2.0 * math.pi))
+
+
+@always_inline
+def angle_rates(roll: float, pitch: float, omega_body: Vec3) -> Vec3:
+    """Return the rates of roll, pitch and yaw [rad/s] from body rates (theory, eq. (4.17)); singular at +-pi/2."""
+    s, c = math.sincos(roll)
+    turn = (s * omega_body[1] + c * omega_body[2]) / math.cos(pitch)
+    return (omega_body[0] + math.sin(pitch) * turn, c * omega_body[1] - s * omega_body[2], turn)
+
+
+@always_inline
+def body_rates(roll: float, pitch: float, rates: Vec3) -> Vec3:
+    """Return omega_body of the rates of roll, pitch and yaw, the inverse of `angle_rates`."""
+    s, c = math.sincos(roll)
+    turn = math.cos(pitch) * rates[2]
+    return (rates[0] - math.sin(pitch) * rates[2], c * rates[1] + s * turn, c * turn - s * rates[1])
+
+
+@always_inline
+def error_by_angle(angles: Vec3, angles_reference: Vec3, rates_reference: Vec3, omega_body: Vec3) -> tuple[Vec3, Vec3]:
+    """Return reference minus measured (roll, pitch, yaw) [rad] and its derivative [rad/s], as in the paper."""
+    rates = angle_rates(angles[0], angles[1], omega_body)
+    roll, pitch, yaw = subtract(angles_reference, angles)
+    return (roll, pitch, wrap(yaw)), subtract(rates_reference, rates)
+
+
+@always_inline
+def error_on_so3(
+    attitude: Quaternion, angles_reference: Vec3, rates_reference: Vec3, omega_body: Vec3
+) -> tuple[Vec3, Vec3]:
+    """Return the rotation vector [rad] in body axes from the attitude to the reference and its rate [rad/s].
+
+    Free of singularities (theory, eq. (4.18)).
+    """
+    reference = from_roll_pitch_yaw(angles_reference[0], angles_reference[1], angles_reference[2])
+    between = multiply(conjugate(attitude), reference)
+    omega_reference = rotate(between, body_rates(angles_reference[0], angles_reference[1], rates_reference))
+    return log(between), subtract(omega_reference, omega_body)
 
 
 class Command(NamedTuple):
@@ -38,7 +84,6 @@ class Command(NamedTuple):
     roll_reference: float  # [rad] reference of the inner loop
     pitch_reference: float  # [rad]
     yaw_reference: float  # [rad]
-    finished: bool  # landed, motors off
 
 
 class Parameters(NamedTuple):
@@ -66,7 +111,6 @@ class Parameters(NamedTuple):
 class State(NamedTuple):
     """State of the controller."""
 
-    landed_state: LandedState
     integral_world: Vec3  # [m s] integral of the position error
     integral_angles: Vec3  # [rad s] integral of the errors of roll, pitch and yaw
     tilt_x: Angle  # reference of the pitch
@@ -75,7 +119,7 @@ class State(NamedTuple):
     tilt_cut: tuple[float, float]  # sign of the part of the tilts that the limit removed, world axes
 
 
-START = State(INITIAL_LANDED_STATE, ZERO, ZERO, AT_REST, AT_REST, VirtualControls(0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
+START = State(ZERO, ZERO, AT_REST, AT_REST, VirtualControls(0.0, 0.0, 0.0, 0.0), (0.0, 0.0))
 
 
 @always_inline
@@ -128,7 +172,7 @@ def collective_control(
 def step(
     p: Parameters, s: State, dt: float, estimate: StateEstimate, setpoint: Setpoint, failed: int
 ) -> tuple[State, Command]:
-    """Return the state and the command after a tick.
+    """Return the state and the command after a tick in flight.
 
     Args:
         p: parameters.
@@ -140,12 +184,6 @@ def step(
     """
     roll, pitch, yaw = to_roll_pitch_yaw(estimate.attitude)
     angles = (roll, pitch, yaw)
-    landed = update_landed_state(s.landed_state, p.resting_height, estimate, setpoint, dt)
-    if landed.name != FLYING:
-        off = zero_thrust(p.shares[0])
-        rest = State(landed, ZERO, ZERO, AT_REST, AT_REST, s.cut, (0.0, 0.0))
-        return rest, Command(off, off, 0.0, 0.0, setpoint.yaw, landed.name == LANDED)
-
     error = subtract(setpoint.position_world, estimate.position_world)
     error_rate = subtract(setpoint.velocity_world, estimate.velocity_world)
     # The horizontal integral is in world axes: a steady wind does not turn with the heading.
@@ -192,5 +230,5 @@ def step(
     )
     thrust = clamp_to_range(mix(shares, saturated), p.thrust_max)
     volts = voltages(p.motor, thrust)
-    state = State(landed, integral, integral_angles, tilt_x, tilt_y, cut, to_heading(-yaw, (cut_x, cut_y)))
-    return state, Command(volts, thrust, angles_reference[0], angles_reference[1], setpoint.yaw, False)
+    state = State(integral, integral_angles, tilt_x, tilt_y, cut, to_heading(-yaw, (cut_x, cut_y)))
+    return state, Command(volts, thrust, angles_reference[0], angles_reference[1], setpoint.yaw)

@@ -58,6 +58,7 @@ class Airframe(NamedTuple):
     rotor_z: PerRotor = ()  # [m] of tilted rotors
     rotor_axis: tuple[Vec3, ...] = ()  # unit vector of each rotor's thrust, body; (): body z
     wakes: WakeSlopes = WakeSlopes()  # coupling of rotors in the wakes of others; thrusts are those of isolated rotors
+    rotational_drag: Vec3 = (0.0, 0.0, 0.0)  # [N m s] torque over the rate about each body axis
 
 
 def build(gains: Gains, airframe: Airframe, geometric: bool = False) -> Parameters:

@@ -18,25 +18,25 @@ from lapwing.services.common.ports import StateEstimate
 
 
 def topic_encoders(
-    setup: RunConfig, estimate_every: int, status_every: int, phases: Sequence[str], status_texts: Sequence[Any]
+    config: RunConfig, estimate_every: int, status_every: int, phases: Sequence[str], status_texts: Sequence[Any]
 ) -> list[TopicEncoder]:
     """Return the encoders of the autopilot's topics.
 
     Args:
-        setup: run configuration.
+        config: run configuration.
         estimate_every: ticks between two messages of the estimate.
-        status_every: ticks between two messages of the status.
+        status_every: largest number of ticks between two messages of the status.
         phases: phase names by index; may grow.
         status_texts: status texts of the commander by index; may grow.
     """
     return [
-        actuators_encoder(setup.port(ports.ACTUATORS)),
+        actuators_encoder(config.port(ports.ACTUATORS)),
         TopicEncoder(
             topic.ESTIMATE, ports.ESTIMATE, estimate_every, _estimate, _estimate_sample, lambda x: [x.rejected]
         ),
         setpoint_encoder(topic.SETPOINT, ports.SETPOINT, phases),
         status_encoder(status_every, phases, status_texts),
-        *([_covariance_encoder(setup.port(name))] if (name := ports.ESTIMATE_COVARIANCE) in setup.ports else []),
+        *([_covariance_encoder(config.port(name))] if (name := ports.ESTIMATE_COVARIANCE) in config.ports else []),
     ]
 
 

@@ -10,6 +10,17 @@ from lapwing.services.autopilot.pid import Pid
 
 FREQUENCIES = np.geomspace(0.01, 700.0, 20_000)  # [rad/s] up to the Nyquist frequency at 250 Hz
 
+LOOP_WORDS = {
+    "altitude": "altitude loop",
+    "yaw": "yaw loop",
+    "roll": "roll loop",
+    "y": "sideways position loop",
+    "y_plant_input": "roll with sideways loop",
+    "pitch": "pitch loop",
+    "x": "forward position loop",
+    "x_plant_input": "pitch with forward loop",
+}
+
 
 class Margins(NamedTuple):
     """Stability margins of a loop."""

@@ -68,6 +68,17 @@ def clamp_to_range(values: PerRotor, highest: float) -> PerRotor:
     return map_tuple(_clamp, highest, values, values)
 
 
+@always_inline
+def _scaled(factor: float, value: float, _: float) -> float:
+    return factor * value
+
+
+@always_inline
+def scale_all(factor: float, values: PerRotor) -> PerRotor:
+    """Return the values multiplied by a factor."""
+    return map_tuple(_scaled, factor, values, values)
+
+
 def airmode(values: Mapping[str, float]) -> int:
     """Return the air mode that the autopilot's parameters select."""
     return int(values.get("MC_AIRMODE", AIRMODE_ROLL_PITCH))  # not in logs of former versions

@@ -5,8 +5,8 @@ import math
 from lapwing.cosim.scene import Scene
 from lapwing.services.autopilot.controller_parameters import Airframe, lift, moments
 from lapwing.services.autopilot.motor import Motor
-from lapwing.services.common import vehicle_schema
-from lapwing.services.common.vehicle_schema import (
+from lapwing.services.common.schemas import vehicle_schema
+from lapwing.services.common.schemas.vehicle_schema import (
     Effects,
     airframe,
     gravity,
@@ -29,6 +29,7 @@ def _known_airframe(scene: Scene) -> Airframe:
     x, y, z = zip(*frame.rotors.position, strict=True)
     axis = frame.rotors.tilted_axis
     engine = frame.motor
+    drag = scene[Effects].tables.get("rotational_drag", {}).get("linear", (0.0, 0.0, 0.0))
     nominal = Airframe(
         frame.mass.total,
         frame.mass.inertia,
@@ -42,6 +43,7 @@ def _known_airframe(scene: Scene) -> Airframe:
         gravity(scene),
         rotor_z=z if axis else (),
         rotor_axis=axis,
+        rotational_drag=(float(drag[0]), float(drag[1]), float(drag[2])),
     )
     isolated, nominal = nominal, nominal._replace(wakes=wake_slopes(scene))
     if "gyroscopic_torque" not in scene[Effects].tables or nominal.gravity <= 0.0:

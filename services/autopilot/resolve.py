@@ -1,5 +1,6 @@
 """Resolution of a scene's `[autopilot]` into the service's configuration."""
 
+import math
 from collections.abc import Callable
 
 from lapwing.cosim.config.run_config import ServiceConfig
@@ -11,16 +12,17 @@ from lapwing.services.autopilot.custom.user_code_loader import controller_rate, 
 from lapwing.services.autopilot.estimator import Estimator
 from lapwing.services.autopilot.estimator.filter_parameters import NO_STATIC_PRESSURE_ERROR
 from lapwing.services.autopilot.gains import GainSet
+from lapwing.services.autopilot.land_detector import Thresholds
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.autopilot.schema import ESTIMATORS, Autopilot, distance_sensor
-from lapwing.services.autopilot.service_config import AutopilotSetup, CustomCode
+from lapwing.services.autopilot.service_config import AutopilotConfig, CustomCode
 from lapwing.services.common import autopilot_parameters, ports, user_modules
-from lapwing.services.common.communication_schema import Communication, Rates, ticks
-from lapwing.services.common.environment_schema import environment, known_magnetic_field
 from lapwing.services.common.firmware.schema import flown_by_firmware
 from lapwing.services.common.ports import AutopilotStatus, EstimateCovariance, MotorCommand, Setpoint, StateEstimate
-from lapwing.services.common.run_schema import follows_trajectory
-from lapwing.services.common.vehicle_schema import gravity, start_place
+from lapwing.services.common.schemas.communication_schema import Communication, Rates, ticks
+from lapwing.services.common.schemas.environment_schema import environment, known_magnetic_field
+from lapwing.services.common.schemas.run_schema import follows_trajectory
+from lapwing.services.common.schemas.vehicle_schema import gravity, start_place
 
 FUSED = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.GPS, ports.SONAR, ports.RANGEFINDER, ports.OPTICAL_FLOW)
 
@@ -29,51 +31,54 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     """Return the configuration of the autopilot. Return None if the scene has no `[autopilot]` or another firmware."""
     if not scene.has(Autopilot) or flown_by_firmware(scene):
         return None
-    config, exchange, rates = scene[Autopilot], scene[Communication], scene[Rates]
+    settings, exchange, rates = scene[Autopilot], scene[Communication], scene[Rates]
     follows = follows_trajectory(scene)
-    exact, user_code = config.estimator == "ground_truth", config.estimator not in ESTIMATORS
+    exact, user_code = settings.estimator == "ground_truth", settings.estimator not in ESTIMATORS
     installed = sorted(scene.tables("sensors"))
     sensors = [name for name in FUSED if name in installed and not exact and not user_code]
     if ports.RANGEFINDER in sensors and distance_sensor(scene) != ports.RANGEFINDER:
         sensors.remove(ports.RANGEFINDER)
     inputs = [InputPort(ports.TRUTH)] if exact else [InputPort(name) for name in (installed if user_code else sensors)]
+    gyro_range = math.radians(scene.lookup("sensors.imu.gyro").range_dps) if ports.IMU in sensors else math.inf
     imus = scene.lookup("sensors.imu.instances") if ports.IMU in sensors else 1
     inputs += [InputPort(name) for name in ports.IMUS[1:imus]]
-    if ports.AIRSPEED in installed and config.accept_commands and not user_code:
+    if ports.AIRSPEED in installed and settings.accept_commands and not user_code:
         inputs.append(InputPort(ports.AIRSPEED))  # published for the operator only
     inputs += [InputPort(ports.BATTERY), *([InputPort(ports.TRAJECTORY)] if follows else [])]
     every = {name: ticks(scene, scene.lookup(f"sensors.{name}.rate"), name) for name in sensors}
     imu_every = every.get(ports.IMU, 1)
-    setup = AutopilotSetup(
+    config = AutopilotConfig(
         None if exact or user_code else _estimator(scene, imu_every),
         start_place(scene),
         imu_every,
         _gps_delay(scene, imu_every) if ports.GPS in sensors else 0,
         scene[GainSet].plain(),
-        config.attitude_error == "so3",
+        settings.attitude_error == "so3",
         known_airframe(scene),
         tuple(autopilot_parameters.table(scene).values()),
         tuple(phase.name for phase in scene.lookup("trajectory.phase")) if follows else (),
-        config.accept_commands,
+        settings.accept_commands,
         (),
         ticks(scene, min(rates.estimate, exchange.rate), "rates.estimate"),
         ticks(scene, min(rates.status, exchange.rate), "rates.status"),
         ticks(scene, min(rates.commands, exchange.rate), "rates.commands"),
-        _controller(scene),
+        _custom(scene, "controller", controller_rate) if settings.controller else None,
         _custom(scene, "estimator", estimator_rate) if user_code else None,
-        vehicle_model(known_airframe(scene), exchange.interval) if config.controller or user_code else None,
+        vehicle_model(known_airframe(scene), exchange.interval) if settings.controller or user_code else None,
         imus,
         distance_sensor(scene),
+        Thresholds(**settings.landing.model_dump()),
+        gyro_range,
     )
-    no_voltage = (0.0,) * len(setup.airframe.rotor_x)
+    no_voltage = (0.0,) * len(config.airframe.rotor_x)
     return ServiceConfig(
-        setup,
+        config,
         tuple(inputs),
         (
             Port(ports.ACTUATORS, MotorCommand(no_voltage, False, no_voltage, (0.0, 0.0, 0.0))),
             Port(ports.ESTIMATE, StateEstimate()),
             Port(ports.SETPOINT, Setpoint()),
-            Port(ports.STATUS, AutopilotStatus(), setup.status_every),
+            Port(ports.STATUS, AutopilotStatus()),
             *([] if exact or user_code else [_covariance(scene)]),
         ),
     )
@@ -82,13 +87,6 @@ def resolve(scene: Scene) -> ServiceConfig | None:
 def _covariance(scene: Scene) -> Port:
     every = ticks(scene, min(scene[Rates].covariance, scene[Communication].rate), "rates.covariance")
     return Port(ports.ESTIMATE_COVARIANCE, EstimateCovariance(), every)
-
-
-def _controller(scene: Scene) -> CustomCode | None:
-    name = scene[Autopilot].controller
-    if name == autopilot_parameters.PX4_CASCADE:
-        return CustomCode(name, {}, 1)
-    return _custom(scene, "controller", controller_rate) if name else None
 
 
 def _custom(scene: Scene, key: str, rate: Callable[..., float]) -> CustomCode:

@@ -2,7 +2,7 @@
 
 from typing import Any, ClassVar, Literal
 
-from pydantic import Field
+from pydantic import BaseModel, ConfigDict, Field
 
 from lapwing.cosim.scene import Files, Scene
 from lapwing.cosim.scene.files import merge_tables, unvalidated_value
@@ -11,12 +11,12 @@ from lapwing.kernels import math
 from lapwing.services.autopilot.controller_parameters import Airframe, build, hover_thrust, hover_torque
 from lapwing.services.autopilot.gains import FOLDER, GainSet
 from lapwing.services.autopilot.nominal_airframe import known_airframe
+from lapwing.services.autopilot.parameter_file import parse
 from lapwing.services.common import autopilot_parameters as parameters
 from lapwing.services.common import ports, user_code, user_modules
-from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.firmware.schema import FIRMWARES, FirmwareKeys, is_foreign
-from lapwing.services.common.parameter_file import parse
-from lapwing.services.common.vehicle_schema import Effects, airframe
+from lapwing.services.common.schemas.environment_schema import environment
+from lapwing.services.common.schemas.vehicle_schema import Effects, airframe
 
 ESTIMATORS = ("kalman", "ground_truth")
 NEEDED = ("imu", "magnetometer", "gps")  # sensors that the filter needs to start
@@ -35,6 +35,22 @@ def distance_sensor(scene: Scene) -> str | None:
     return ports.RANGEFINDER if points_down else None
 
 
+class LandingTable(BaseModel):
+    """Thresholds for stopping the motors (theory, section 4.5).
+
+    With `cut_height` they stop at once below that height, as in the paper. Otherwise they stop after contact with the
+    ground: on the way down, with a low thrust, at rest vertically, and held up by more than the rotors, for a time.
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
+    cut_height: float = Field(default=0.0, ge=0.0, le=1.0)  # [m] above the resting height; 0: contact is detected
+    thrust: float = Field(default=0.75, gt=0.0, lt=1.0)  # of the hover thrust, above which there is no contact
+    ground_force: float = Field(default=0.25, gt=0.0, lt=1.0)  # of the weight, the least force of the ground
+    vertical_speed: float = Field(default=0.2, gt=0.0, le=1.0)  # [m/s] above which there is no contact
+    hold_time: float = Field(default=0.1, gt=0.0, le=5.0)  # [s] of contact before the motors ramp down
+    ramp_time: float = Field(default=0.6, gt=0.0, le=5.0)  # [s] from the full thrust command to none
+
+
 class Autopilot(FirmwareKeys):
     """The autopilot."""
 
@@ -45,10 +61,11 @@ class Autopilot(FirmwareKeys):
     estimator_options: dict[str, Option] = Field(default_factory=dict)  # options of its constructor
     expected_wind_speed: float = Field(default=10.0, ge=0, le=30)  # [m/s] expected by the Kalman filter
     attitude_error: Literal["euler", "so3"] = "euler"  # Euler angles, as in the paper, or SO(3)
-    controller: str | None = None  # "px4": PX4's cascade; "module:Name": a user's; default: cascaded PID
+    controller: str | None = None  # "module:Name" of a user's class; default: cascaded PID
     controller_options: dict[str, Option] = Field(default_factory=dict)  # options of its constructor
     accept_commands: bool = False  # accept commands of an operator
     follow_trajectory: bool = True  # follow the scene's [trajectory]; false: start disarmed and wait for commands
+    landing: LandingTable = LandingTable()
     parameters: dict[str, float] = Field(default_factory=dict)  # values by name, or path of a parameter file
 
     @classmethod
@@ -66,8 +83,6 @@ class Autopilot(FirmwareKeys):
             if key == "estimator" and isinstance(code, str) and ":" not in code:
                 if code not in ESTIMATORS:
                     raise ConfigError.unknown(where, "estimator", code, (*ESTIMATORS, "module:Name"))
-            elif code == parameters.PX4_CASCADE and key == "controller":
-                continue
             elif isinstance(code, str) and (module := user_code.split_reference(where, code)[0]) != user_code.MEMORY:
                 user_modules.embed(tree, files, where, module)
         if isinstance(file := unvalidated_value(tree, cls.TABLE, "parameters"), str):
@@ -92,8 +107,7 @@ class Autopilot(FirmwareKeys):
         except ValueError as error:
             raise ConfigError("airframe", str(error)) from None
         _check_motor_limits(scene, frame)
-        shipped = self.controller in (None, parameters.PX4_CASCADE)
-        for key, unused in (("controller", shipped), ("estimator", self.estimator in ESTIMATORS)):
+        for key, unused in (("controller", self.controller is None), ("estimator", self.estimator in ESTIMATORS)):
             if unused and getattr(self, f"{key}_options"):
                 raise ConfigError(f"autopilot.{key}_options", "is not used", f'autopilot.{key} = "module:Name" too')
         if self.estimator == "kalman":

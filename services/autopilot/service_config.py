@@ -1,10 +1,12 @@
 """Resolved configuration of the autopilot."""
 
+import math
 from typing import Any, NamedTuple
 
 from lapwing.dynamics.vector import Vec3
 from lapwing.services.autopilot.controller_parameters import Airframe, Gains
 from lapwing.services.autopilot.estimator import Estimator
+from lapwing.services.autopilot.land_detector import Thresholds
 from lapwing.services.common.autopilot_parameters import Parameter
 from lapwing.services.common.controller_api import VehicleModel
 
@@ -17,7 +19,7 @@ class CustomCode(NamedTuple):
     every: int  # [ticks] between two steps
 
 
-class AutopilotSetup(NamedTuple):
+class AutopilotConfig(NamedTuple):
     """Configuration of an autopilot."""
 
     estimator: Estimator | None  # None: ground truth or user code
@@ -34,11 +36,18 @@ class AutopilotSetup(NamedTuple):
     estimate_every: int  # [ticks] between two messages of the estimate
     status_every: int
     answers_every: int
-    controller: CustomCode | None = None  # None: the cascaded PID; name "px4": PX4's cascade
+    controller: CustomCode | None = None  # None: the cascaded PID
     own_estimator: CustomCode | None = None
     vehicle: VehicleModel | None = None  # vehicle parameters for user code
     imus: int = 1  # units that the autopilot votes on
     distance_sensor: str | None = None  # port of the sensor of the distance to the ground
+    landing: Thresholds = Thresholds()
+    gyro_range: float = math.inf  # [rad/s]
+
+    @property
+    def height_known(self) -> bool:
+        """True if the height above the ground is measured, as far as the estimator uses it."""
+        return self.distance_sensor is not None or (self.estimator is None and self.own_estimator is None)
 
     @property
     def has_gps(self) -> bool:

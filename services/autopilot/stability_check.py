@@ -1,20 +1,29 @@
-"""Warning about gains that make a loop unstable in hover."""
+"""Gains that make a loop unstable in hover."""
 
 from lapwing.cosim.scene import Scene
 from lapwing.kernels import math
 from lapwing.services.autopilot.controller_parameters import build
 from lapwing.services.autopilot.gains import GainSet
-from lapwing.services.autopilot.margins import excess, open_loops
+from lapwing.services.autopilot.margins import LOOP_WORDS, excess, open_loops
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.autopilot.schema import Autopilot
-from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.firmware.schema import flown_by_firmware
+from lapwing.services.common.schemas.communication_schema import Communication
 
+CASCADES = (("roll", "y_plant_input", "y"), ("pitch", "x_plant_input", "x"))  # loops of an axis, the cause first
+GAINS = {  # keys of the gain set that set the gain of a loop
+    "roll": "roll_inner",
+    "y_plant_input": "roll_outer or roll_inner",
+    "y": "roll_outer",
+    "pitch": "pitch_inner",
+    "x_plant_input": "pitch_outer or pitch_inner",
+    "x": "pitch_outer",
+}
 MODELS = ("rigid_body", "multibody", "slung_load")  # plant models to which the margins apply
 
 
 def unstable_loops(scene: Scene) -> list[str]:
-    """Return a line for each loop of the scene's autopilot that is unstable in hover, with its gain margin."""
+    """Return a line for each axis of the scene's autopilot that is unstable in hover, with what to change."""
     if (
         not scene.has(Autopilot)
         or flown_by_firmware(scene)
@@ -27,12 +36,19 @@ def unstable_loops(scene: Scene) -> list[str]:
     config, exchange, airframe = scene[Autopilot], scene[Communication], known_airframe(scene)
     p = build(scene[GainSet].plain(), airframe)
     loops = open_loops(p, airframe, exchange.interval, exchange.loop_delay)
-    peaks = {name: excess(response) for name, response in loops.items()}
-    return [f"gains {config.gains}: {name}: unstable{_by(factor)}" for name, factor in peaks.items() if factor != 1.0]
+    factors = {name: excess(response) for name, response in loops.items()}
+    result, gains = [], config.gains.rpartition("/")[2]
+    for cascade in (("altitude",), ("yaw",), *CASCADES):
+        name = next((name for name in cascade if factors[name] != 1.0), None)
+        if name:
+            result.append(f"{LOOP_WORDS[name]} unstable{_advice(name, factors[name])} of gains {gains}")
+    return result
 
 
-def _by(factor: float) -> str:
+def _advice(loop: str, factor: float) -> str:
+    """Return how far a loop is from stability, and the gains to change."""
+    keys = GAINS.get(loop, loop)
     if math.isnan(factor):
-        return " at any gain"
+        return f" at any gain; change {keys}"
     decibels = 20.0 * math.log(factor) / math.log(10.0)
-    return f", gain margin {-abs(decibels):.1f} dB: the gain is too {'high' if decibels > 0.0 else 'low'}"
+    return f" by {abs(decibels):.1f} dB; {'lower' if decibels > 0.0 else 'raise'} {keys}"

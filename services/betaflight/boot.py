@@ -1,6 +1,6 @@
 """Start of Betaflight SITL: configuration through its command line, restart, and calibration at rest."""
 
-import socket
+import itertools
 import time
 from collections.abc import Callable
 
@@ -8,14 +8,14 @@ from lapwing.cosim.processes.patience import Patience
 from lapwing.services.betaflight import msp
 from lapwing.services.betaflight.msp import FirmwareStatus, Msp
 from lapwing.services.betaflight.packets import Ports
-from lapwing.services.betaflight.resolve import PilotSetup
-from lapwing.services.common.firmware.link import FirmwareError, Waits
-from lapwing.services.common.firmware.program import Program
-from lapwing.services.common.firmware.setup import FirmwareSetup
+from lapwing.services.betaflight.resolve import PilotConfig
+from lapwing.services.common.firmware.firmware_config import FirmwareConfig
+from lapwing.services.common.firmware.link import Waits
+from lapwing.services.common.firmware.program import FirmwareError, Program
 
 MODES = ("aux 0 0 0 1700 2100 0 0", "aux 1 1 1 1700 2100 0 0")  # ARM on channel 5, ANGLE on channel 6
-FEED_EVERY = 0.004  # [s] between two packets at rest
-POLL_EVERY = 0.2  # [s]
+FIRST_REQUEST = 0.1  # [s] of wall time until the system has delivered the connection and its first request
+POLL_EVERY = 50  # packets at rest between two requests of the status
 IGNORED = ("arm switch", "not disarmed")  # reasons that disappear when the arm switch opens
 PROMPT = "# "  # end of the command line's output
 NOT_READY = ("starting",)  # reasons of a firmware that got RC channels too early, and ignores them from then on
@@ -28,53 +28,31 @@ class IncompleteStart(FirmwareError):
     """Part of the firmware has not started; a restart resolves this."""
 
 
-def start(setup: FirmwareSetup, waits: Waits) -> Program | None:
-    """Start and configure the program. Return None if it is started elsewhere.
-
-    Raises:
-        FirmwareError: the program cannot be started, another one runs, or it rejects a line of the configuration.
-    """
-    if not setup.command:
-        return None
-    port = Ports.of(setup).msp
-    if _listens(setup.host, port):
-        message = f"betaflight: TCP port {port} is in use: another Betaflight runs"
-        raise FirmwareError(f"{message}; end it, or leave autopilot.command out to use it")
-    program = Program(setup)
-    try:
-        _configure(setup, program, waits)
-        program.restart()
-    except BaseException:
-        program.close()
-        raise
-    return program
-
-
-def connect(setup: FirmwareSetup, program: Program | None, waits: Waits) -> Msp:
+def connect(config: FirmwareConfig, program: Program | None, waits: Waits) -> Msp:
     """Return an MSP connection to the running firmware.
 
     Raises:
         FirmwareError: nothing listens within `start_timeout`.
     """
-    port = Ports.of(setup).msp
-    patience = Patience(setup.start_timeout, program.pid if program else None)
+    port = Ports.of(config).msp
+    patience = Patience(config.start_timeout, program.pid if program else None, pauses=True)
     while not patience.over:
-        waits(f"Betaflight at {setup.host}:{port}")
+        waits(f"Betaflight at {config.host}:{port}")
         if program:
             program.check(" at its start")
             if f"bind port {port} for UART1 failed" in program.text():
                 raise IncompleteStart(f"betaflight: cannot open TCP port {port}")
         try:
-            return Msp(setup.host, port)
+            return Msp(config.host, port)
         except OSError:
             time.sleep(0.05)
-    start_it = f"start betaflight_SITL.elf {setup.host}, or set autopilot.command"
+    start_it = f"start betaflight_SITL.elf {config.host}, or set autopilot.command"
     advice = "check autopilot.command" if program else start_it
-    raise FirmwareError(f"betaflight: no answer at {setup.host}:{port} after {setup.start_timeout:g} s; {advice}")
+    raise FirmwareError(f"betaflight: no answer at {config.host}:{port} after {config.start_timeout:g} s; {advice}")
 
 
 def settle(
-    setup: FirmwareSetup,
+    config: FirmwareConfig,
     link: Msp,
     program: Program | None,
     feed: Callable[[bool], None],
@@ -84,10 +62,10 @@ def settle(
     """Send the state of a vehicle at rest to the firmware until it can be armed.
 
     Args:
-        setup: configuration with the time-out.
+        config: configuration with the time-out.
         link: connection for the status.
         program: the program, if Lapwing runs it.
-        feed: sends the state, and RC channels if its argument is True.
+        feed: sends the state, and RC channels if its argument is True; waits a time step.
         waits: see `FirmwareLink`.
         can_restart: the program can be started again.
 
@@ -95,51 +73,48 @@ def settle(
         IncompleteStart: it does not receive RC channels, and `can_restart` is True.
         FirmwareError: it cannot be armed within `start_timeout`; the text has its reasons.
     """
-    patience = Patience(setup.start_timeout, program.pid if program else None)
-    rc_patience = Patience(RC_TIMEOUT, program.pid if program else None)
-    status, next_poll = None, 0.0
-    while not patience.over:
+    patience = Patience(config.start_timeout, program.pid if program else None, pauses=True)
+    rc_patience = Patience(RC_TIMEOUT, program.pid if program else None, pauses=True)
+    status = None
+    for count in itertools.count():
+        if patience.over:
+            break
         waits("Betaflight's calibration")
         if program:
             program.check(" at its start")
+        if count % POLL_EVERY == 0:
+            link.send(msp.request(msp.STATUS))
+            time.sleep(0.0 if count else FIRST_REQUEST)
         feed(status is not None)  # RC channels before the start of the firmware would disable them
-        for command, payload in link.poll():
+        for command, payload in link.poll() if (count + 1) % POLL_EVERY == 0 else ():  # long after its arrival
             if command == msp.STATUS:
                 status = msp.parse_status(payload)
         if status and not set(status.blockers).difference(IGNORED):
             return status
         if can_restart and rc_patience.over and (status is None or status.blockers == NOT_READY):
             raise IncompleteStart(f"betaflight: does not {'receive RC channels' if status else 'answer by MSP'}")
-        if (now := time.monotonic()) >= next_poll:
-            next_poll = now + POLL_EVERY
-            link.send(msp.request(msp.STATUS))
-        time.sleep(FEED_EVERY)
     reasons = ", ".join(status.blockers) if status else "no answer by MSP"
-    message = f"betaflight: cannot be armed after {setup.start_timeout:g} s ({reasons})"
+    message = f"betaflight: cannot be armed after {config.start_timeout:g} s ({reasons})"
     raise FirmwareError(f"{message}; check its configuration")
 
 
-def _listens(host: str, port: int) -> bool:
-    try:
-        socket.create_connection((host, port), timeout=0.5).close()
-    except OSError:
-        return False
-    return True
+def configure(config: FirmwareConfig, program: Program, waits: Waits) -> None:
+    """Write the configuration through the command line; `save` ends the program.
 
-
-def _configure(setup: FirmwareSetup, program: Program, waits: Waits) -> None:
-    """Write the configuration through the command line; `save` ends the program."""
-    link = connect(setup, program, waits)
+    Raises:
+        FirmwareError: the program rejects a line of the configuration.
+    """
+    link = connect(config, program, waits)
     try:
         _command(link, "#", program, waits)  # alone: a further byte would cancel it
         _command(link, "version\n", program, waits)  # completes the line of a second "#", a comment
-        for line in lines(setup):
+        for line in lines(config):
             answer = _command(link, f"{line}\n", program, waits)
             if "###ERROR" in answer or "Invalid" in answer:
                 text = " ".join(answer.replace("\r", "").split())
                 raise FirmwareError(f"betaflight: rejects the line {line!r} ({text}); check autopilot.parameters")
         link.send(b"save\n")
-        patience = Patience(SAVE_TIMEOUT, program.pid)
+        patience = Patience(SAVE_TIMEOUT, program.pid, pauses=True)
         while program.running:
             waits("Betaflight's configuration")
             if patience.over:
@@ -152,7 +127,7 @@ def _configure(setup: FirmwareSetup, program: Program, waits: Waits) -> None:
 def _command(link: Msp, line: str, program: Program, waits: Waits) -> str:
     """Send a line and return the answer up to the next prompt."""
     link.send(line.encode())
-    answer, patience = "", Patience(SAVE_TIMEOUT, program.pid)
+    answer, patience = "", Patience(SAVE_TIMEOUT, program.pid, pauses=True)
     sent = time.monotonic()
     while not answer.endswith(PROMPT):
         waits("Betaflight's command line")
@@ -167,9 +142,9 @@ def _command(link: Msp, line: str, program: Program, waits: Waits) -> str:
     return answer
 
 
-def lines(setup: FirmwareSetup) -> list[str]:
+def lines(config: FirmwareConfig) -> list[str]:
     """Return the lines for the firmware's command line; those of the scene come last and take precedence."""
-    pilot: PilotSetup = setup.own
+    pilot: PilotConfig = config.own
     rate = round(pilot.yaw_rate_limit_deg / 10.0)
     required = [
         "map AETR1234",
@@ -187,5 +162,5 @@ def lines(setup: FirmwareSetup) -> list[str]:
         *(f"set {axis}_{key} = {rate}" for axis in ("roll", "pitch", "yaw") for key in ("rc_rate", "srate")),
         *(f"set {axis}_expo = 0" for axis in ("roll", "pitch", "yaw")),
     ]
-    own = [line for line in setup.parameter_text.splitlines() if line.strip() and not line.startswith("#")]
-    return required + own + [f"set {name} = {value:g}" for name, value in setup.parameters.items()]
+    own = [line for line in config.parameter_text.splitlines() if line.strip() and not line.startswith("#")]
+    return required + own + [f"set {name} = {value:g}" for name, value in config.parameters.items()]

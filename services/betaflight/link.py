@@ -1,82 +1,59 @@
-"""Link to Betaflight SITL: real time, UDP for state, RC and motors, MSP for status.
+"""Link to Betaflight SITL: UDP for state, RC and motors, MSP for status.
 
-The firmware would set the rate of its clock by the wall time between two packets of increasing time, which on a busy
-machine varies by a factor of 100. All packets therefore carry the same time, so that its clock runs at wall time, or at
-`betaflight.clock_rate` times wall time, which is set and measured before the first tick. A late packet shifts all later
-ones: a simulation that catches up would be faster than the firmware.
+The firmware has no lock step. One that Lapwing starts runs in turns (`repeatable.c`): its clock moves by one tick with
+each state packet, and it answers when it has nothing more to do at this time. Any other runs in real time.
+
+The firmware would set the rate of its clock by the time between two packets of increasing time. All packets therefore
+carry the same time.
 """
 
 import socket
 import time
 from contextlib import suppress
+from functools import partial
 
 from lapwing.kernels import math
 from lapwing.services.betaflight import boot, msp
-from lapwing.services.betaflight.clock import slow_down
 from lapwing.services.betaflight.packets import Ports, parse_motors, rc_packet, state_packet
 from lapwing.services.betaflight.pilot import OFF, Pilot, Sticks
-from lapwing.services.betaflight.resolve import NAME, PilotSetup
+from lapwing.services.betaflight.resolve import PilotConfig
 from lapwing.services.betaflight.state_source import StateSource
 from lapwing.services.common import ports
-from lapwing.services.common.firmware.datagrams import bound_socket
-from lapwing.services.common.firmware.link import FirmwareOutput, LinkReport, Read, Waits
-from lapwing.services.common.firmware.program import ProgramLink
-from lapwing.services.common.firmware.setup import FirmwareSetup
+from lapwing.services.common.firmware.firmware_config import FirmwareConfig
+from lapwing.services.common.firmware.link import FirmwareOutput, ProgramLink, Read
+from lapwing.services.common.firmware.program import TCP, UDP, OwnPort
+from lapwing.services.common.firmware.repeatable import Turns
+from lapwing.services.common.firmware.service import firmware_service
 
-TIME = 1.0  # [s] in all packets, unless the clock is slowed down
+TIME = 1.0  # [s] in all packets
 RC_EVERY = 0.01  # [s]
 STARTS = 3  # starts of the program while it does not receive RC channels
 STATUS_EVERY = 0.2  # [s]
+FEED_EVERY = 0.004  # [s] between two packets at rest in real time
 RUNNING = 0.02  # motor output above which the vehicle is armed
 REPLY = 0.05  # [s] longest wait for motor outputs before the state is sent again
+LONG_REPLY = 0.2  # [s] of one wait in turns
 PEER_TIMEOUT = 1.0  # [s] of silence after which another firmware may take over
-
-
-LATE = 1.0  # intervals after its time at which a packet counts as late
-FASTEST = 0.8  # shortest fraction of an interval between two packets
-
-
-class Pace:
-    """Pacing of packets in wall time, with statistics of its accuracy."""
-
-    def __init__(self, report: LinkReport) -> None:
-        """Store the report."""
-        self._report = report
-        self._next = self._sent = 0.0  # [s] of the wall clock
-        self._count = self._sum = self._squares = 0.0  # sums of the times [s] between packets
-
-    def wait(self, interval: float, rate: float) -> None:
-        """Wait until `interval` [s] after the last packet; `rate`: simulation time per wall time."""
-        now, report = time.monotonic(), self._report
-        if self._sent == 0.0:
-            self._next = now
-        if now < self._next:
-            time.sleep(self._next - now)
-            now = time.monotonic()
-        if now - self._next > LATE * interval:
-            report.late += 1
-        report.skew_max = max(report.skew_max, rate * (now - self._next))
-        if self._sent > 0.0:
-            self._add(now - self._sent)
-        self._sent = now
-        self._next = max(self._next + interval, now + FASTEST * interval)
-
-    def _add(self, gap: float) -> None:
-        """Add a time [s] between two packets to the statistics."""
-        self._count, self._sum, self._squares = self._count + 1, self._sum + gap, self._squares + gap * gap
-        mean = self._sum / self._count
-        self._report.jitter = math.sqrt(max(0.0, self._squares / self._count - mean * mean))
+LOST = "no position: descends level and lands"
+FASTEST = 0.8  # shortest fraction of an interval between two packets in real time
+IDLE = b"idle"  # answer of the library if the firmware sends no motor outputs
+BOOT = 6_000_000_000  # [ns] of the firmware's clock until the first packet
+READING = 100  # [ns] by which a reading moves the firmware's clock
 
 
 class BetaflightLink(ProgramLink):
     """Connection to one Betaflight SITL."""
 
-    def __init__(self, setup: FirmwareSetup) -> None:
+    ADVICE = "stop the other program that uses it; a campaign needs --workers 1"
+
+    def __init__(self, config: FirmwareConfig) -> None:
         """Store the configuration."""
-        self._setup, self._ports = setup, Ports.of(setup)
-        pilot: PilotSetup = setup.own
-        self.report = LinkReport("betaflight", reproducible=False)
-        self._source, self._pilot = StateSource(pilot, setup.start_world), Pilot(pilot, setup.start_world)
+        super().__init__(config)
+        self._ports = Ports.of(config)
+        kinds = zip((self._ports.state, self._ports.rc, self._ports.msp), (UDP, UDP, TCP), strict=True)
+        self.OWN_PORTS = tuple(OwnPort(kind, port, 0) for port, kind in kinds)
+        pilot: PilotConfig = config.own
+        self._source, self._pilot = StateSource(pilot, config.start_world), Pilot(pilot, config.start_world)
         self._msp: msp.Msp | None = None
         self._socket: socket.socket | None = None
         self._status = msp.FirmwareStatus(False, (), 0.0)
@@ -84,34 +61,34 @@ class BetaflightLink(ProgramLink):
         self._sender: tuple[str, int] | None = None  # sender of the motor outputs
         self._armed = False
         self._output_at = 0.0  # [s] wall time of the last motor outputs
-        self._pace = Pace(self.report)
-        self._clock_rate = pilot.clock_rate
-        self._stamp = TIME  # [s] in all packets
-        self._rate = 1.0  # rate of the firmware's clock
+        self._next = 0.0  # [s] wall time of the next packet in real time
         self._rc_at = self._status_at = -math.inf  # [s] simulation time
         self._sticks = OFF
 
-    def open(self, waits: Waits) -> None:
+    def _claim(self) -> None:
+        self._socket = self._bound(UDP, self._ports.motors)
+
+    def _peer(self) -> tuple[int, int] | None:
+        return (UDP, self._ports.state)
+
+    def _begin(self) -> None:
         """Start the firmware or wait for it, and calibrate it."""
-        setup = self._setup
-        advice = "stop the other run or simulator that uses it; a campaign needs --workers 1"
-        self._socket = bound_socket(NAME, setup.host, self._ports.motors, advice)
-        self._program = boot.start(setup, waits)
-        self._calibrate(waits)
-        if self._clock_rate < 1.0:
-            assert self._msp is not None
-            self._rate, self._stamp = slow_down(self._clock_rate, self._msp, self._feed, waits, TIME)
-            self.report.note(f"the firmware's clock runs at {self._rate:.3g} of real time")
+        if self._config.command:
+            self._start()
+            assert self._program is not None
+            boot.configure(self._config, self._program, self._waits)
+            ports = self._ports
+            step = self._config.interval_ns
+            turns = Turns(
+                "b", ports.state, step, (ports.msp, ports.motors), IDLE, ports.motors, start_ns=BOOT, read_ns=READING
+            )
+            self._turns = partial(self._prepare, turns)
+            self._program.restart(self._turns())
+        self._calibrate()
 
-    def _feed(self, stamp: float) -> None:
-        """Send the state at rest with a time [s], and RC channels; discard the outputs."""
-        self._stamp = stamp
-        self._send(OFF)
-        self._drain(0.0)
-
-    def _calibrate(self, waits: Waits) -> None:
+    def _calibrate(self) -> None:
         """Connect to the firmware and calibrate it; start it again if it does not receive RC channels."""
-        setup = self._setup
+        config = self._config
         assert self._socket is not None
         self._socket.settimeout(0.0)
         with suppress(OSError):
@@ -120,12 +97,17 @@ class BetaflightLink(ProgramLink):
 
         def feed(with_rc: bool) -> None:
             self._send(OFF if with_rc else None)
-            self._drain(0.0)
+            if self.in_turns:
+                self._await()
+            else:
+                self._drain(0.0)
+                time.sleep(FEED_EVERY)
 
         for left in reversed(range(STARTS if self._program else 1)):
+            self._take_turns("ready")
             try:
-                self._msp = boot.connect(setup, self._program, waits)
-                self._status = boot.settle(setup, self._msp, self._program, feed, waits, left > 0)
+                self._msp = boot.connect(config, self._program, self._waits)
+                self._status = boot.settle(config, self._msp, self._program, feed, self._waits, left > 0)
                 return
             except boot.IncompleteStart as error:
                 if not left:
@@ -135,16 +117,16 @@ class BetaflightLink(ProgramLink):
                 if self._msp:
                     self._msp.close()
                 self._program.stop()
-                self._program.restart()
+                self._program.restart(self._turns())
                 self._sender = None
 
-    def step(self, tick: int, read: Read, waits: Waits) -> FirmwareOutput:
+    def step(self, tick: int, read: Read) -> FirmwareOutput:
         """Send state and sticks at the time of the tick, and return the newest motor outputs."""
-        interval = self._setup.interval
+        interval = self._config.interval
         t = self._time = tick * interval
-        motion = self._source.update(t, read)
-        self._sticks = self._pilot.step(t, interval, read(ports.TRAJECTORY), motion)
-        self._pace.wait(interval / self._rate, self._rate)
+        self._sticks = self._pilot.step(t, interval, read(ports.TRAJECTORY), self._source.update(t, read))
+        if not self.in_turns:
+            self._pace(interval)
         self._drain(0.0)  # outputs since the last reply are older than this tick
         if t >= self._rc_at + RC_EVERY:
             self._rc_at = t
@@ -152,29 +134,38 @@ class BetaflightLink(ProgramLink):
         else:
             self._send(None)
         start = time.monotonic()
-        if not self._drain(REPLY):
+        if self.in_turns:
+            self._await()
+        elif not self._drain(REPLY):
             self.report.missed += 1
-            self._repeat(waits)
+            self._await()
         self.report.waiting += time.monotonic() - start
         self._poll_status(t)
         return self._output()
+
+    def _pace(self, interval: float) -> None:
+        """Wait until `interval` [s] of wall time after the last packet; a late packet shifts all later ones."""
+        now = time.monotonic()
+        self._next = self._next or now
+        time.sleep(max(0.0, self._next - now))
+        self.report.late += now > self._next + interval
+        self._next = max(self._next + interval, now + FASTEST * interval)
 
     def close(self) -> None:
         """Close the connections and end the program."""
         if self._msp:
             self._msp.close()
+        super().close()
         if self._socket:
             self._socket.close()
-        if self._program:
-            self._program.close()
-        self._program = self._msp = self._socket = None
+        self._msp = self._socket = None
 
     def _send(self, sticks: Sticks | None) -> None:
         assert self._socket is not None
         with suppress(OSError):  # the firmware does not run; `step` detects its silence
-            self._socket.sendto(state_packet(self._stamp, self._source.state), (self._setup.host, self._ports.state))
-            if sticks:
-                self._socket.sendto(rc_packet(self._stamp, tuple(sticks)), (self._setup.host, self._ports.rc))
+            if sticks:  # first, since the state ends a turn
+                self._socket.sendto(rc_packet(TIME, tuple(sticks)), (self._config.host, self._ports.rc))
+            self._socket.sendto(state_packet(TIME, self._source.state), (self._config.host, self._ports.state))
 
     def _drain(self, timeout: float) -> bool:
         """Receive all pending motor outputs; wait at most `timeout` [s] for the first. Return False if none arrived."""
@@ -196,33 +187,36 @@ class BetaflightLink(ProgramLink):
         now = time.monotonic()
         if self._sender not in (None, sender):
             if now - self._output_at < PEER_TIMEOUT:
-                self.report.rejected += 1
-                self.report.note(f"a second Betaflight ({sender[0]}:{sender[1]}) sent motor outputs, which are ignored")
+                host, port = sender
+                self.report.reject(f"a second Betaflight ({host}:{port}) sent motor outputs, which are ignored")
                 return False
             self.report.reconnected += 1
         try:
-            self._outputs = parse_motors(data)
+            self._outputs = self._outputs if data == IDLE and self.in_turns else parse_motors(data)
         except ValueError as error:
-            self.report.rejected += 1
-            self.report.note(f"malformed motor outputs: {error}")
+            self.report.reject(f"malformed motor outputs: {error}")
             return False
         self._sender, self._output_at = sender, now
         return True
 
-    def _repeat(self, waits: Waits) -> None:
-        """Send the state again until motor outputs arrive: the simulation pauses while the firmware gets no CPU.
+    def _await(self) -> None:
+        """Wait for motor outputs: the simulation pauses while the firmware gets no CPU.
+
+        The state is sent again in real time, where the system may have lost a packet.
 
         Raises:
             FirmwareError: the firmware has been silent for too long, or has ended.
         """
-        patience = self._patience(self._setup.step_timeout)
-        while True:
-            waits("Betaflight's motor outputs")
-            self._check(patience, "no motor outputs", "the firmware has stalled or ended")
-            self.report.resent += 1
-            self._send(self._sticks)
-            if self._drain(REPLY):
+        if self.in_turns and self._drain(LONG_REPLY):
+            return
+        timeout = self._config.step_timeout
+        for _ in self._attempts("Betaflight's motor outputs", timeout):
+            if not self.in_turns:
+                self.report.resent += 1
+                self._send(self._sticks)
+            if self._drain(LONG_REPLY if self.in_turns else REPLY):
                 return
+        self._time_out(f"no motor outputs for {timeout:g} s", "the firmware has stalled or ended")
 
     def _poll_status(self, t: float) -> None:
         assert self._msp is not None
@@ -239,7 +233,9 @@ class BetaflightLink(ProgramLink):
         armed = max(self._outputs) > RUNNING
         stage = self._pilot.stage
         text = ""
-        if stage in ("flying", "landing") and not armed:
+        if self._pilot.lost:
+            text = LOST
+        elif stage in ("flying", "landing") and not armed:
             text = "disarmed in flight"
         blockers = tuple(b for b in self._status.blockers if b not in boot.IGNORED)
         landed = stage in ("waiting", "landed")
@@ -247,3 +243,6 @@ class BetaflightLink(ProgramLink):
         return FirmwareOutput(
             self._outputs, armed, landed, finished, f"angle ({stage})", text, blockers, self._pilot.attitude_reference
         )
+
+
+create = partial(firmware_service, name="betaflight", link=BetaflightLink)

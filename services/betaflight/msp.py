@@ -7,7 +7,7 @@ import socket
 import struct
 from typing import NamedTuple
 
-STATUS, SET_RTC, RTC = 150, 246, 247  # MSP_STATUS_EX, MSP_SET_RTC, MSP_RTC
+STATUS = 150  # MSP_STATUS_EX
 ARM = 1  # bit of the flight mode flags
 BLOCKERS = (
     "no gyro", "failsafe", "no RC signal", "not disarmed", "failsafe switch", "runaway take-off", "crash detected",
@@ -35,15 +35,6 @@ def request(command: int, payload: bytes = b"") -> bytes:
 
 def _checksum(body: bytes) -> int:
     return functools.reduce(operator.xor, body, 0)
-
-
-def parse_time(payload: bytes) -> float:
-    """Return the time of day [s] in an MSP_RTC reply, 0 if the firmware has no date."""
-    try:
-        hours, minutes, seconds, millis = struct.unpack_from("<3BH", payload, 4)
-    except struct.error:
-        return 0.0
-    return float(3600 * hours + 60 * minutes + seconds + 1e-3 * millis)
 
 
 def parse_status(payload: bytes) -> FirmwareStatus:

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 from lapwing.dynamics.lie.quaternion import Quaternion
 from lapwing.dynamics.vector import Vec3
-from lapwing.services.common.firmware.setup import FirmwareSetup
+from lapwing.services.common.firmware.firmware_config import FirmwareConfig
 
 STATE, RC, MOTORS = struct.Struct("<18d"), struct.Struct("<d16H"), struct.Struct("<4f")
 RC_LOW, RC_MIDDLE, RC_HIGH = 1000, 1500, 2000  # [us]
@@ -21,9 +21,9 @@ class Ports(NamedTuple):
     msp: int = 5761
 
     @classmethod
-    def of(cls, setup: FirmwareSetup) -> "Ports":
+    def of(cls, config: FirmwareConfig) -> "Ports":
         """Return the ports of a configuration: the firmware's defaults, or four that start at `autopilot.port`."""
-        first = setup.port
+        first = config.port
         return cls(first, first + 1, first + 2, first + 3) if first else cls()
 
 

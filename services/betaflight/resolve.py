@@ -10,17 +10,17 @@ from lapwing.dynamics.geodesy import Home
 from lapwing.kernels import math
 from lapwing.services.betaflight.schema import Betaflight
 from lapwing.services.common import ports
-from lapwing.services.common.communication_schema import Communication
-from lapwing.services.common.environment_schema import environment
+from lapwing.services.common.firmware.firmware_config import firmware_config
 from lapwing.services.common.firmware.schema import firmware_of
-from lapwing.services.common.firmware.setup import firmware_config
-from lapwing.services.common.vehicle_schema import airframe, gravity, thrust_coefficient
+from lapwing.services.common.schemas.communication_schema import Communication
+from lapwing.services.common.schemas.environment_schema import environment
+from lapwing.services.common.schemas.vehicle_schema import airframe, gravity, thrust_coefficient
 
 NAME = "betaflight"
 SLOWEST = 50  # [Hz] at which the firmware does not measure its clock's rate
 
 
-class PilotSetup(NamedTuple):
+class PilotConfig(NamedTuple):
     """Resolved values of the pilot."""
 
     tilt_limit_deg: float
@@ -29,7 +29,6 @@ class PilotSetup(NamedTuple):
     velocity_gain: float  # [1/s]
     integral_gain: float  # [1/s^3]
     yaw_gain: float  # [1/s]
-    clock_rate: float  # seconds of the firmware's clock per second of wall time, at most 1
     hover_output: float  # motor output in hover, 0 to 1
     gravity: float  # [m/s^2]
     gps: bool  # position and velocity of the receiver, otherwise ground truth
@@ -52,7 +51,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         raise ConfigError("communication.rate", f"got {rate} Hz", f"more than {SLOWEST} Hz with Betaflight")
     sensor_names = set(scene.tables("sensors"))
     table = scene[Betaflight] if scene.has(Betaflight) else Betaflight()
-    pilot = PilotSetup(
+    pilot = PilotConfig(
         **table.model_dump(),
         hover_output=_hover_output(scene),
         gravity=gravity(scene),

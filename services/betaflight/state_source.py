@@ -6,11 +6,14 @@ from lapwing.dynamics.vector import ZERO, Vec3
 from lapwing.kernels import python_function
 from lapwing.services.betaflight.packets import State
 from lapwing.services.betaflight.pilot import Motion
-from lapwing.services.betaflight.resolve import PilotSetup
+from lapwing.services.betaflight.resolve import PilotConfig
 from lapwing.services.common import ports
 from lapwing.services.common.firmware.link import Read
 
 STANDARD_PRESSURE = 101325.0  # [Pa] without a barometer
+AIR_WEIGHT = 12.0  # [N/m^3] change of pressure over height near the ground
+CURRENT = 0.3  # [s] age of a receiver's velocity that is used as it is
+HEIGHT_GAIN, SPEED_GAIN = 2.0, 2.0  # [1/s], [1/s^2] of the climb rate's observer
 _to_geodetic, _to_enu = python_function(enu_to_geodetic), python_function(geodetic_to_enu)
 _rotate, _conjugate = python_function(rotate), python_function(conjugate)
 _angles = python_function(to_roll_pitch_yaw)
@@ -19,17 +22,19 @@ _angles = python_function(to_roll_pitch_yaw)
 class StateSource:
     """Newest samples; a sensor without a new reading keeps its last one."""
 
-    def __init__(self, setup: PilotSetup, start_world: Vec3):
+    def __init__(self, config: PilotConfig, start_world: Vec3):
         """Start with the vehicle at rest at `start_world`, level and heading east."""
-        self._setup = setup
-        latitude, longitude, height = _to_geodetic(setup.home, start_world)
-        force = (0.0, 0.0, setup.gravity)
+        self._config = config
+        latitude, longitude, height = _to_geodetic(config.home, start_world)
+        force = (0.0, 0.0, config.gravity)
         self.state = State(ZERO, force, NO_ROTATION, ZERO, latitude, longitude, height, STANDARD_PRESSURE)
         self._position, self._velocity, self._fixed_at = start_world, (0.0, 0.0, 0.0), 0.0
+        self._climb_rate = self._climb = self._time = 0.0  # [m/s], [m], [s]
+        self._start_pressure: float | None = None
 
     def update(self, time: float, read: Read) -> Motion:
         """Update the state with the samples at `time` [s]. Return the motion."""
-        s, truth = self._setup, read(ports.TRUTH)
+        s, truth = self._config, read(ports.TRUTH)
         state = self.state._replace(attitude=truth.attitude)
         if not s.imu:
             state = state._replace(omega_body=truth.omega_body, specific_force_body=_specific_force(truth, s.gravity))
@@ -39,9 +44,9 @@ class StateSource:
             state = state._replace(pressure=baro.pressure)
         if not s.gps:
             self._position, self._velocity, self._fixed_at = truth.position_world, truth.velocity_world, time
-            place = _to_geodetic(s.home, truth.position_world)
-            state = state._replace(velocity_world=truth.velocity_world)._replace(
-                latitude_deg=place[0], longitude_deg=place[1], height=place[2]
+            latitude, longitude, height = _to_geodetic(s.home, truth.position_world)
+            state = state._replace(
+                velocity_world=truth.velocity_world, latitude_deg=latitude, longitude_deg=longitude, height=height
             )
         elif (gps := read(ports.GPS)).valid and gps != getattr(self, "_gps", None):
             self._gps = gps
@@ -52,9 +57,26 @@ class StateSource:
                 latitude_deg=gps.latitude_deg, longitude_deg=gps.longitude_deg, height=gps.height,
             )  # fmt: skip
         self.state = state
+        self._observe_climb(time)
         elapsed = min(time - self._fixed_at, 1.0)
         position = tuple(p + v * elapsed for p, v in zip(self._position, self._velocity, strict=True))
-        return Motion(position, self._velocity, _angles(state.attitude)[2])  # type: ignore[arg-type]
+        heading = _angles(state.attitude)[2]
+        return Motion(position, self._velocity, heading, time - self._fixed_at, self._climb_rate)  # type: ignore[arg-type]
+
+    def _observe_climb(self, time: float) -> None:
+        """Integrate the vertical acceleration; barometer and receiver correct the climb rate."""
+        s, elapsed = self._config, time - self._time
+        acceleration = _rotate(self.state.attitude, self.state.specific_force_body)[2] - s.gravity
+        error = 0.0
+        if s.barometer:
+            if self._start_pressure is None and self.state.pressure != STANDARD_PRESSURE:
+                self._start_pressure = self.state.pressure
+            error = ((self._start_pressure or self.state.pressure) - self.state.pressure) / AIR_WEIGHT - self._climb
+        self._climb_rate += elapsed * (acceleration + SPEED_GAIN * error)
+        self._climb += elapsed * (self._climb_rate + HEIGHT_GAIN * error)
+        if time - self._fixed_at < CURRENT:
+            self._climb_rate = self._velocity[2]
+        self._time = time
 
 
 def _specific_force(truth: ports.TrueState, gravity: float) -> Vec3:

@@ -1,9 +1,8 @@
 """Autopilot parameters that can be changed in flight: meaning, default and bounds.
 
 Names and units are PX4's where the meaning is the same; MAVLink allows 16 characters. Only gains of the cascaded PID
-(PID_...) and failsafe actions (FS_...) have Lapwing's own names. Defaults of PID_... come from the scene's gain set; a
-scene with PX4's cascade has PX4's gains instead. `[autopilot.parameters]` sets other values, or `autopilot.parameters`
-names a file of them (parameter_file.py).
+(PID_...) and failsafe actions (FS_...) have Lapwing's own names. Defaults of PID_... come from the scene's gain set.
+`[autopilot.parameters]` sets other values, or `autopilot.parameters` names a file of them (parameter_file.py).
 """
 
 import math
@@ -23,6 +22,7 @@ _RETURNS = (
 BAROMETER_HEIGHT, GPS_HEIGHT, SONAR_HEIGHT = 0, 1, 2  # EKF2_HGT_REF
 HEIGHT_SENSORS = ("barometer", "gps", "sonar")
 """Sensor of each value of EKF2_HGT_REF."""
+_HEIGHT_KNOWN = "with a distance sensor or the true state"
 _LEVELS = "1 low, 2 critical, 3 nearly empty"
 _HEIGHTS = "0 barometer, 1 GPS, 2 distance sensor, above the ground"
 NOTHING, HOLD, RETURN, LAND, DESCEND, TERMINATE = 0, 1, 2, 3, 4, 5  # failsafe actions
@@ -58,8 +58,22 @@ class Parameter(NamedTuple):
 
 _FLIGHT = (
     Parameter("MIS_TAKEOFF_ALT", "m", 2.5, 0.5, 100.0, "default take-off height above home"),
+    Parameter(
+        "MIS_DIST_1WP", "m", 10000.0, -1.0, 1e5, "maximum distance of a mission's first position; 0 or less: no limit"
+    ),
     Parameter("MPC_TKO_SPEED", "m/s", 1.5, 0.1, 5.0, "take-off speed"),
-    Parameter("MPC_LAND_SPEED", "m/s", 0.7, 0.1, 2.0, "landing speed near the ground"),
+    Parameter("MPC_LAND_SPEED", "m/s", 0.7, 0.1, 2.0, "landing speed below MPC_LAND_ALT2"),
+    Parameter("MPC_LAND_CRWL", "m/s", 0.3, 0.1, 2.0, f"landing speed below MPC_LAND_ALT3, {_HEIGHT_KNOWN}"),
+    Parameter("MPC_LAND_ALT1", "m", 10.0, 0.0, 122.0, "height above home from which a landing slows down"),
+    Parameter("MPC_LAND_ALT2", "m", 5.0, 0.0, 122.0, "height above home below which a landing has its slow speed"),
+    Parameter(
+        "MPC_LAND_ALT3",
+        "m",
+        1.0,
+        0.0,
+        122.0,
+        "height above home of the slowest descent, and of the final approach of a trajectory",
+    ),
     Parameter("MPC_XY_CRUISE", "m/s", 5.0, 0.1, 20.0, "default horizontal speed"),
     Parameter("MPC_XY_VEL_MAX", "m/s", 8.0, 0.1, 20.0, "maximum horizontal speed"),
     Parameter("MPC_Z_VEL_MAX_UP", "m/s", 3.0, 0.1, 8.0, "maximum climb speed"),
@@ -154,80 +168,6 @@ _TERMS = "PID"
 _UNITS = {"altitude": "N/m", "pitch_outer": "rad/m", "roll_outer": "rad/m"}  # units of P; N/rad for the other loops
 
 
-PX4_CASCADE = "px4"  # controller with PX4's gains
-_MANY = 1000.0  # bound of gains that PX4 does not bound
-
-
-def _px4_axis(axis: str, stem: str, p: tuple[float, ...], d_most: float) -> list[Parameter]:
-    """Return the rate gains of an axis; `p`: default, minimum, maximum of P, defaults of I and D, minimum of K."""
-    name, label = f"MC_{axis}RATE", axis.lower()
-    default, least, most, i, d, k_least = p
-    return [
-        Parameter(f"{name}_K", "", 1.0, k_least, 5.0, f"scale of P, I and D of the {label} rate"),
-        Parameter(f"{name}_P", "s", default, least, most, f"gain from the {label} rate error to the normalised torque"),
-        Parameter(
-            f"{name}_I", "", i, 0.0, _MANY, f"gain from the integral of the {label} rate error to the normalised torque"
-        ),
-        Parameter(f"{name}_D", "s^2", d, 0.0, d_most, f"gain from the {label} acceleration to the normalised torque"),
-        Parameter(f"{name}_FF", "s", 0.0, 0.0, _MANY, f"gain from the {label} rate setpoint to the normalised torque"),
-        Parameter(
-            f"MC_{stem}R_INT_LIM",
-            "",
-            0.3,
-            0.0,
-            _MANY,
-            f"limit of the integral term of the {label} rate, normalised torque",
-        ),
-    ]
-
-
-_PX4_GAINS = (
-    Parameter("MPC_TILTMAX_AIR", "deg", 45.0, 20.0, 89.0, "maximum tilt"),
-    *_px4_axis("ROLL", "R", (0.15, 0.01, 0.5, 0.2, 0.003, 0.01), 0.01),
-    *_px4_axis("PITCH", "P", (0.15, 0.01, 0.6, 0.2, 0.003, 0.01), _MANY),
-    *_px4_axis("YAW", "Y", (0.2, 0.0, 0.6, 0.1, 0.0, 0.0), _MANY),
-    Parameter("MC_ROLL_P", "1/s", 6.5, 0.0, 12.0, "gain from the roll error to the roll rate setpoint"),
-    Parameter("MC_PITCH_P", "1/s", 6.5, 0.0, 12.0, "gain from the pitch error to the pitch rate setpoint"),
-    Parameter("MC_YAW_P", "1/s", 2.8, 0.0, 5.0, "gain from the yaw error to the yaw rate setpoint"),
-    Parameter("MC_YAW_WEIGHT", "", 0.4, 0.0, 1.0, "weight of yaw relative to roll and pitch"),
-    Parameter("MC_ROLLRATE_MAX", "deg/s", 220.0, 0.0, 1800.0, "maximum roll rate setpoint"),
-    Parameter("MC_PITCHRATE_MAX", "deg/s", 220.0, 0.0, 1800.0, "maximum pitch rate setpoint"),
-    Parameter("MC_YAWRATE_MAX", "deg/s", 200.0, 0.0, 1800.0, "maximum yaw rate setpoint"),
-    Parameter("MPC_XY_P", "1/s", 0.95, 0.0, 2.0, "gain from the horizontal position error to the velocity setpoint"),
-    Parameter("MPC_Z_P", "1/s", 1.0, 0.1, 1.5, "gain from the height error to the climb rate setpoint"),
-    Parameter("MPC_XY_VEL_P_ACC", "1/s", 1.8, 1.2, 5.0, "gain from the horizontal velocity error to the acceleration"),
-    Parameter(
-        "MPC_XY_VEL_I_ACC",
-        "1/s^2",
-        0.4,
-        0.0,
-        60.0,
-        "gain from the integral of the horizontal velocity error to the acceleration",
-    ),
-    Parameter(
-        "MPC_XY_VEL_D_ACC", "", 0.2, 0.1, 2.0, "gain from the measured horizontal acceleration to the acceleration"
-    ),
-    Parameter("MPC_Z_VEL_P_ACC", "1/s", 4.0, 2.0, 15.0, "gain from the vertical velocity error to the acceleration"),
-    Parameter(
-        "MPC_Z_VEL_I_ACC",
-        "1/s^2",
-        2.0,
-        0.2,
-        3.0,
-        "gain from the integral of the vertical velocity error to the acceleration",
-    ),
-    Parameter("MPC_Z_VEL_D_ACC", "", 0.0, 0.0, 2.0, "gain from the measured vertical acceleration to the acceleration"),
-    Parameter("MPC_THR_MIN", "", 0.12, 0.05, 0.5, "minimum collective, fraction"),
-    Parameter("MPC_THR_MAX", "", 1.0, 0.05, 1.0, "maximum collective, fraction"),
-    Parameter("MPC_THR_XY_MARG", "", 0.3, 0.0, 0.5, "collective reserved for horizontal control, fraction"),
-    Parameter("MPC_THR_HOVER", "", 0.5, 0.1, 0.8, "collective in hover while MPC_USE_HTE is 0, fraction"),
-    Parameter("MPC_USE_HTE", "", 1, 0, 1, "1: collective in hover from nominal weight and motors", True),
-    Parameter("MPC_VELD_LP", "Hz", 5.0, 0.0, 50.0, "cut-off of the acceleration for the velocity D gains; 0: none"),
-    Parameter("IMU_DGYRO_CUTOFF", "Hz", 30.0, 0.0, 1000.0, "cut-off of the acceleration for the rate D gains; 0: none"),
-    Parameter("THR_MDL_FAC", "", 0.0, 0.0, 1.0, "quadratic share of the thrust as a function of the motor signal"),
-)
-
-
 _GRIPPER = Parameter("PD_GRIPPER_EN", "", 1, 0, 1, "1: DO_GRIPPER and mission items release the payload", True)
 
 
@@ -256,8 +196,7 @@ def table(scene: "Scene") -> dict[str, Parameter]:
 
 
 def _table(scene: "Scene") -> dict[str, Parameter]:
-    px4 = scene.lookup("autopilot.controller") == PX4_CASCADE
-    gains = _PX4_GAINS if px4 else gain_parameters(scene.section("gains"))
+    gains = gain_parameters(scene.section("gains"))
     parameters = {p.name: p for p in (*gains, *_FLIGHT, *_FAILSAFES, *_equipment(scene))}
     for name, value in scene.lookup("autopilot.parameters").items():
         if name not in parameters:

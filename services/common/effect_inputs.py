@@ -62,4 +62,4 @@ def ports_of(scene: Scene, active: tuple) -> dict[str, Port]:
         active: effects of the scene, in the order of evaluation.
     """
     names = [EFFECT + name for name in external(scene)]
-    return {name: Port(name, like) for name, like in zip(names, inputs_of(active), strict=True)}
+    return {name: Port(name, example) for name, example in zip(names, inputs_of(active), strict=True)}

@@ -46,7 +46,7 @@ def airspeed_encoder(topic: Topic, frame: str, port: Port) -> TopicEncoder:
 def reading_encoder(frame: str, port: Port) -> TopicEncoder:
     """Return the encoder of a port without a message type of its own: all numbers of its value, in order."""
     name = port.name.replace(".", "_")
-    sample = Reading(header(0, frame), name, (0.0,) * row_width(port.like))
+    sample = Reading(header(0, frame), name, (0.0,) * row_width(port.example))
     return TopicEncoder(topic.custom_sensor(name), port.name, port.period, _reading, lambda: sample)
 
 
@@ -80,19 +80,21 @@ def _setpoint(x: Setpoint, time_ns: np.ndarray) -> Fields:
 
 def actuators_encoder(port: Port) -> TopicEncoder:
     """Return the encoder of the motor commands."""
-    command = Actuators(header(0, "body"), port.like.motor_voltage, False, port.like.thrust)
+    command = Actuators(header(0, "body"), port.example.motor_voltage, False, port.example.thrust)
     return TopicEncoder(topic.ACTUATORS, ports.ACTUATORS, 1, _actuators, lambda: command)
 
 
 def status_encoder(every: int, texts: Sequence[str], words: Sequence[Any]) -> TopicEncoder:
-    """Return the encoder of the status.
+    """Return the encoder of the status, which has a message at every change, too.
 
     Args:
-        every: ticks between two messages.
+        every: largest number of ticks between two messages.
         texts: phase names by index; may grow.
         words: status texts by index; may grow.
     """
-    return TopicEncoder(topic.STATUS, ports.STATUS, every, _status, _status_sample(texts, words), _status_texts)
+    return TopicEncoder(
+        topic.STATUS, ports.STATUS, every, _status, _status_sample(texts, words), _status_texts, on_change=True
+    )
 
 
 def _actuators(x: MotorCommand, time_ns: np.ndarray) -> Fields:

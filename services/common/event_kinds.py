@@ -18,9 +18,10 @@ KINDS = {
     "phase": Kind(),
     "arming": Kind(),
     "contact": Kind(),
+    "crash": Kind(serious=True, afterwards=True),
     "slack": Kind(serious=True),
     "motors": Kind(afterwards=True),
     "battery": Kind(),
 }
-"""Event kinds by name: faults, validity warnings, failsafes, modes and phases, arming, ground
-contact, slack links, motors at a limit, charge."""
+"""Event kinds by name: faults, validity warnings, failsafes, modes and phases, arming, contact,
+the crash, slack links, motors at a limit, charge."""

@@ -24,9 +24,9 @@ def permission(granted: bool) -> Iterator[None]:
         _allowed[0] = before
 
 
-def check(setup: "RunConfig") -> None:
+def check(config: "RunConfig") -> None:
     """Raise ValueError if a run has FMUs and foreign code is not allowed."""
-    names = [f"services.{name.removesuffix(FMU_SUFFIX)}" for name in setup.services if name.endswith(FMU_SUFFIX)]
+    names = [f"services.{name.removesuffix(FMU_SUFFIX)}" for name in config.services if name.endswith(FMU_SUFFIX)]
     if names and not _allowed[0]:
         raise ValueError(
             f"{', '.join(names)}: an FMU contains machine code; if you trust its author, use --allow-code to run it"

@@ -160,6 +160,7 @@ class Setpoint(NamedTuple):
     phase: int = 0  # index of the phase's name
     final: bool = False  # no later phase ends in the air: the next landing is the last
     release: bool = False  # open the gripper once the vehicle rests on the ground
+    landing_speed: float = -1.0  # [m/s] downwards at which the phase reaches the ground; negative: it ends in the air
 
 
 class MotorCommand(NamedTuple):

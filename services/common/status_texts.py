@@ -24,11 +24,15 @@ OUTSIDE_FENCE = "the vehicle is outside the fence"
 """Arming blockers; BATTERY_LOW followed by the charge is another."""
 
 ARMED, DISARMED, LANDED = "armed", "disarmed: {}", "landed"
+HELD = "an obstacle holds the vehicle"
+TURNED_OVER = "the vehicle has turned over"
+STOPPED = "the operator has stopped the motors in flight"
 AS_COMMANDED, AFTER_LANDING, NO_TAKEOFF = "as commanded", "landed", "no takeoff after arming"
-"""Reasons for disarming."""
+"""Reasons for disarming; that of a failsafe is another."""
 TAKEN_OVER = "{}: {}"  # reason and mode of a failsafe
 
 IMU_FAILED = "IMU {} has failed, IMU {} is in use"  # for redundant units
 
 ROUTINE = frozenset((ARMED, LANDED, *[DISARMED.format(reason) for reason in (AS_COMMANDED, AFTER_LANDING, NO_TAKEOFF)]))
 """Texts of events that every flight has."""
+HOLDING = "hold until told otherwise at"  # phase of a mission

@@ -5,10 +5,10 @@ from typing import Any, NamedTuple
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.lie.ts2 import Swing, normalise
 from lapwing.dynamics.vector import Vec3, cross, norm, scale, subtract
-from lapwing.dynamics.vehicles.cooperative_control import formation_control
-from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters, CooperativeLoadState
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_index
+from lapwing.papers.cooperative_load.cooperative_control import formation_control
+from lapwing.papers.cooperative_load.cooperative_load import CooperativeLoadParameters, CooperativeLoadState
 from lapwing.services.common.ports import RotorWrenches
 
 

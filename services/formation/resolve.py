@@ -4,12 +4,12 @@ from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.vector import ZERO, norm, scale
-from lapwing.dynamics.vehicles.cooperative_control import FormationControl
-from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters
+from lapwing.papers.cooperative_load.cooperative_control import FormationControl
+from lapwing.papers.cooperative_load.cooperative_load import CooperativeLoadParameters
 from lapwing.services.common import ports
-from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.ports import RotorWrenches
-from lapwing.services.common.run_schema import CooperativeLoad
+from lapwing.services.common.schemas.communication_schema import Communication
+from lapwing.services.common.schemas.run_schema import CooperativeLoad
 from lapwing.services.formation.block import FormationLaw
 from lapwing.services.formation.schema import Formation
 

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.services.common.run_schema import CooperativeLoad, Triple
+from lapwing.services.common.schemas.run_schema import CooperativeLoad, Triple
 
 
 class Formation(SceneTable):

@@ -18,13 +18,13 @@ from lapwing.services.common.ports import RotorWrenches
 NAME = "formation"
 
 
-def create(setup: RunConfig) -> Service:
+def create(config: RunConfig) -> Service:
     """Return the formation control of a run."""
-    config = setup.services[NAME]
-    n = len(setup.port(ports.LIFT).like.thrust)
+    settings = config.services[NAME]
+    n = len(config.port(ports.LIFT).example.thrust)
     message = RotorWrench(header(0, "body"), (0.0,) * n, (Vector3(),) * n)
     encoder = TopicEncoder(topic.LIFT, ports.LIFT, 1, _lift, lambda: message)
-    return Service(NAME, [Block(NAME, config.parameters, Cell(0.0), config.inputs, config.ports)], [encoder])
+    return Service(NAME, [Block(NAME, settings.parameters, Cell(0.0), settings.inputs, settings.ports)], [encoder])
 
 
 def _lift(x: RotorWrenches, time_ns: np.ndarray) -> Fields:

@@ -20,18 +20,18 @@ def run(process: Participant, spec: Any) -> None:
     Raises:
         ValueError: the server cannot listen at the address.
     """
-    setup = process.setup
+    config = process.config
     with Server(spec.foxglove, spec.insecure) as server:
-        events = {EVENTS.zenoh_key(name, process.key_prefix): EVENTS.key(name) for name in setup.vehicles}
+        events = {EVENTS.zenoh_key(name, process.key_prefix): EVENTS.key(name) for name in config.vehicles}
         watcher = dict.fromkeys(events, process.participants.gid(MONITOR))
-        subscription = process.bus.receive(process.participants.senders(BATCH_KEY, setup.services) | watcher)
+        subscription = process.bus.receive(process.participants.senders(BATCH_KEY, config.services) | watcher)
         for topic in events.values():
             server.declare(topic, EVENTS.message.type_name)
-        for name in setup.services:  # so that viewers subscribe before the flight begins
+        for name in config.services:  # so that viewers subscribe before the flight begins
             for recorded in process.create_service(name).topics:
-                server.declare(recorded.key(setup.vehicle), recorded.message.type_name)
+                server.declare(recorded.key(config.vehicle), recorded.message.type_name)
         process.join()
-        unfinished = set(setup.services)  # services whose last log packet has not arrived
+        unfinished = set(config.services)  # services whose last log packet has not arrived
         open_events = set(events) if MONITOR in process.others else set()  # they end after the flight
         while (unfinished or open_events) and not process.stopping:
             message = subscription.get_with_key(POLL)
@@ -47,9 +47,9 @@ def run(process: Participant, spec: Any) -> None:
                 continue
             messages = []
             for page in unpack_log_packet(payload)[2]:
-                topic = page.topic.key(setup.vehicle)
+                topic = page.topic.key(config.vehicle)
                 server.declare(topic, page.topic.message.type_name)
-                times = page.ticks * setup.interval_ns
+                times = page.ticks * config.interval_ns
                 messages += [(int(t), topic, p.tobytes()) for t, p in zip(times, page.payloads, strict=True)]
             for time_ns, topic, content in sorted(messages, key=lambda m: m[0]):
                 server.put(topic, time_ns, content)

@@ -1,19 +1,45 @@
-"""Missions, fences and rally points of the vehicle, and active uploads."""
+"""Missions, fences and rally points of the vehicle, from MAVLink messages, and active uploads."""
 
 from collections import Counter, deque
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 from lapwing.services.common.mavlink.dialect import mavlink
-from lapwing.services.common.mavlink.geo_coordinates import Datum
+from lapwing.services.common.mavlink.geo_coordinates import Datum, degrees
 from lapwing.services.common.mavlink.mission_export import to_mavlink
+from lapwing.services.common.plans.converter import convert, notes
+from lapwing.services.common.plans.item_converters import MAX_ITEMS
+from lapwing.services.common.plans.plan_item import PlanItem, RefusedItemError
 from lapwing.services.mavlink.clock import Clock
 from lapwing.services.mavlink.command_queue import CommandQueue
 from lapwing.services.mavlink.endpoint import Endpoint
-from lapwing.services.mavlink.item_converters import MAX_ITEMS, RejectedItemError
-from lapwing.services.mavlink.mission_import import from_mavlink, texts_of_skipped_items
 from lapwing.services.mavlink.mission_upload import Repeat, Upload
 from lapwing.services.mavlink.statustext import statustext
+
+
+def plan_items(messages: Sequence[Any], home_first: bool) -> list[PlanItem]:
+    """Return the items of MISSION_ITEM_INT messages in order.
+
+    Args:
+        messages: one for each item.
+        home_first: True if ground stations count from home, the first item, as with ArduPilot; otherwise they show the
+            first item as 1.
+    """
+    return [
+        PlanItem(
+            m.seq if home_first else m.seq + 1,
+            m.seq,
+            m.command,
+            m.frame,
+            (m.param1, m.param2, m.param3, m.param4),
+            degrees(m.x),
+            degrees(m.y),
+            m.z,
+            bool(m.autocontinue),
+        )
+        for m in messages
+    ]
+
 
 MAX_WARNINGS = 10  # texts about skipped items
 KINDS = {  # command to the autopilot
@@ -154,10 +180,12 @@ class MissionStore:
 
     def _submit(self, upload: Upload, acknowledged_kind: int | None = None) -> None:
         """Send the complete items to the autopilot, or reject them."""
+        received = plan_items(upload.items, self._home_first)
         try:
-            items = from_mavlink(upload.items, self._home_first, self._datum())
-        except RejectedItemError as error:
+            items = convert(received, upload.kind, self._datum(), self._home_first)
+        except RefusedItemError as error:
             self._counts["invalid item"] += 1
+            _send_text(upload.endpoint, mavlink.MAV_SEVERITY_ERROR, f"Upload rejected: {error}")
             self._end(upload, error.result)
             return
         upload.complete = True
@@ -167,9 +195,8 @@ class MissionStore:
                 return
             if acknowledgement.result == mavlink.MAV_RESULT_ACCEPTED:
                 self.items[upload.kind] = upload.items
-                for text in texts_of_skipped_items(upload.items)[:MAX_WARNINGS]:
-                    for message in statustext(mavlink.MAV_SEVERITY_WARNING, text):
-                        upload.endpoint.send(message)
+                for text in notes(received)[:MAX_WARNINGS]:
+                    _send_text(upload.endpoint, mavlink.MAV_SEVERITY_WARNING, text)
             self._end(upload, _RESULTS.get(acknowledgement.result, mavlink.MAV_MISSION_ERROR), acknowledged_kind)
 
         self._commands.put(KINDS[upload.kind], upload.endpoint.name, on_acknowledgement, items=items)
@@ -186,3 +213,8 @@ class MissionStore:
 
     def _acknowledge(self, endpoint: Endpoint, kind: int, result: int) -> None:
         endpoint.send(mavlink.MAVLink_mission_ack_message(endpoint.system, endpoint.component, result, kind))
+
+
+def _send_text(endpoint: Endpoint, severity: int, text: str) -> None:
+    for message in statustext(severity, text):
+        endpoint.send(message)

@@ -7,10 +7,10 @@ from lapwing.dynamics.effects.battery_thevenin import BatteryThevenin
 from lapwing.dynamics.effects.payload_release import PayloadRelease
 from lapwing.kernels import python_function
 from lapwing.services.common.autopilot_parameters import table
-from lapwing.services.common.communication_schema import Communication
-from lapwing.services.common.environment_schema import environment
 from lapwing.services.common.firmware.schema import flown_by_firmware
-from lapwing.services.common.vehicle_schema import Vehicle, active, airframe, start_height
+from lapwing.services.common.schemas.communication_schema import Communication
+from lapwing.services.common.schemas.environment_schema import environment
+from lapwing.services.common.schemas.vehicle_schema import Vehicle, active, airframe, start_height
 from lapwing.services.mavlink.schema import Mavlink
 from lapwing.services.mavlink.vehicle_description import Battery, Rotor, VehicleDescription
 

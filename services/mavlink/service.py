@@ -5,8 +5,11 @@ real-time factor, each estimate wakes it. It reads all other topics from the ser
 per second, which stay in the queue until the next estimate.
 """
 
+import os
+import selectors
+import threading
 import time
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from contextlib import ExitStack
 from operator import itemgetter
 from pathlib import Path
@@ -24,7 +27,59 @@ from lapwing.services.mavlink.link_options import Options
 from lapwing.services.mavlink.link_server import LinkServer
 from lapwing.services.mavlink.links import for_vehicle_index
 from lapwing.services.mavlink.signing import TIME_STAMPS, read_key, state_folder
-from lapwing.services.mavlink.socket_watch import SocketWatch
+
+
+class SocketWatch:
+    """Thread that waits for data of endpoints; a context manager.
+
+    Messages of the run cause most wake-ups of a link. With this thread the main thread waits for those only, which
+    takes fewer system calls than a wait for both.
+
+    Attributes:
+        ready: True if a socket is ready, until `resume`.
+    """
+
+    def __init__(self, selector: selectors.BaseSelector, wake: Callable[[], None]):
+        """Start the thread.
+
+        Args:
+            selector: selector of the sockets, which another thread reads.
+            wake: called in this thread when a socket is ready, and not again before `resume`.
+        """
+        self._selector, self._wake = selector, wake
+        self.ready = self._closed = False
+        self._resume = threading.Event()
+        self._end = os.eventfd(0, os.EFD_NONBLOCK)
+        selector.register(self._end, selectors.EVENT_READ, lambda: None)
+        self._thread = threading.Thread(target=self._run, name="sockets", daemon=True)
+        self._thread.start()
+
+    def _run(self) -> None:
+        while True:
+            self._selector.select()
+            if self._closed:
+                return
+            self.ready = True
+            self._wake()
+            self._resume.wait()
+            self._resume.clear()
+
+    def resume(self) -> None:
+        """Resume the wait; called after all ready sockets have been served."""
+        self.ready = False
+        self._resume.set()
+
+    def __enter__(self) -> "SocketWatch":
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self._closed = True
+        os.eventfd_write(self._end, 1)
+        self._resume.set()
+        self._thread.join()
+        self._selector.unregister(self._end)
+        os.close(self._end)
+
 
 WAIT = 0.05  # [s] longest wait
 ALL = (OPERATOR, STATUS, COMMAND_ACKS, ESTIMATE)  # topics of which all messages are handled
@@ -40,7 +95,7 @@ def run(process: Participant, spec: Any) -> None:
     Raises:
         ValueError: a link cannot be opened.
     """
-    setup = process.setup
+    config = process.config
     # Every message that wakes a process slows a run without real-time factor; log packets arrive often enough.
     immediate = process.speed is not None
     with ExitStack() as stack:
@@ -55,13 +110,13 @@ def run(process: Participant, spec: Any) -> None:
             for other in others:
                 other.adapter.tick(time.monotonic())
 
-        senders = process.participants.senders(BATCH_KEY, setup.services)
+        senders = process.participants.senders(BATCH_KEY, config.services)
         estimates = dict.fromkeys(by_estimate_key, process.participants.encoder_gid("autopilot"))
         log_packets = process.bus.receive(senders, deferred=True)
         first_source = process.bus.receive(estimates, deferred=True) if immediate else log_packets  # wakes this process
         process.join(serve)  # endpoints may connect while the others still load or compile
         sockets = stack.enter_context(SocketWatch(first_server.selector, first_source.wake))
-        unfinished = set(setup.services)  # services whose last log packet has not arrived
+        unfinished = set(config.services)  # services whose last log packet has not arrived
         while unfinished and not process.stopping:
             message = first_source.get_with_key(0.0 if sockets.ready else WAIT)
             if message is None or sockets.ready:
@@ -74,7 +129,7 @@ def run(process: Participant, spec: Any) -> None:
                     if payload:
                         by_estimate_key[name].handle(ESTIMATE, time_ns, payload)
                 elif payload:
-                    _handle_log_packet(servers, payload, immediate, setup.interval_ns)
+                    _handle_log_packet(servers, payload, immediate, config.interval_ns)
                 else:
                     unfinished.discard(name.rpartition("/")[2])
         process.confirm()
@@ -89,12 +144,12 @@ def _open_servers(process: Participant, spec: Any, stack: ExitStack) -> dict[str
     Raises:
         ValueError: no vehicle has an autopilot, or a link cannot be opened.
     """
-    setup = process.setup
-    linked_members = [member for member in members(setup) if "mavlink" in member.auxiliary]
+    config = process.config
+    linked_members = [member for member in members(config) if "mavlink" in member.auxiliary]
     if not linked_members:
         raise ValueError("--mavlink: the scene has no autopilot; use a scene with [autopilot]")
     for module in {member.resolved["mavlink"].get("module") for member in linked_members} - {None}:
-        user_module.load(module, setup.modules)  # declares its messages
+        user_module.load(module, config.modules)  # declares its messages
     key = read_key(Path(spec.mavlink_key)) if spec.mavlink_key else None
     log = Path(spec.log) if spec.log else None
     publish = process.bus.publisher(f"{process.key_prefix}/{OPERATOR_KEY}/{process.name}")

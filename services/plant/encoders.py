@@ -45,40 +45,40 @@ class PlantEncoding(NamedTuple):
     bodies: tuple[str, ...]  # names, in the order of the port
 
 
-def topic_encoders(setup: RunConfig, encoding: PlantEncoding) -> list[TopicEncoder]:
+def topic_encoders(config: RunConfig, encoding: PlantEncoding) -> list[TopicEncoder]:
     """Return the encoders of the plant's topics."""
-    truth, declared_ports, every = setup.port(ports.TRUTH), setup.ports, encoding.pose_every
+    truth, declared_ports, every = config.port(ports.TRUTH), config.ports, encoding.pose_every
     result = [
-        TopicEncoder(topic.TRUTH, ports.TRUTH, 1, _truth, lambda: _truth_sample(truth.like)),
+        TopicEncoder(topic.TRUTH, ports.TRUTH, 1, _truth, lambda: _truth_sample(truth.example)),
         TopicEncoder(topic.POSE, ports.TRUTH, every, pose_columns, lambda: PoseStamped(header(0, WORLD))),
-        TopicEncoder(topic.TF, ports.TRUTH, every, _transform, lambda: _transform_sample(setup.vehicle)),
+        TopicEncoder(topic.TF, ports.TRUTH, every, _transform, lambda: _transform_sample(config.vehicle)),
         TopicEncoder(topic.CLOCK, ports.TRUTH, every, lambda _, time_ns: stamp_columns(time_ns, "clock"), Clock),
     ]
     if encoding.odometry:
-        odometry = Odometry(header(0, WORLD), setup.vehicle)
+        odometry = Odometry(header(0, WORLD), config.vehicle)
         result.append(TopicEncoder(topic.ODOM, ports.TRUTH, every, _odometry, lambda: odometry))
     optional = {
-        ports.BATTERY: (topic.BATTERY, _battery(encoding), lambda _: _battery_sample(setup.vehicle, encoding)),
+        ports.BATTERY: (topic.BATTERY, _battery(encoding), lambda _: _battery_sample(config.vehicle, encoding)),
         ports.BODIES: (topic.BODIES, _bodies, lambda _: _bodies_sample(encoding.bodies)),
         ports.CONTACT: (topic.CONTACT, _contact, _contact_sample),
     }
     for name, (message_topic, fields, sample_of) in optional.items():
         if name in declared_ports:
             port = declared_ports[name]
-            sample = sample_of(port.like)
+            sample = sample_of(port.example)
             result.append(TopicEncoder(message_topic, name, port.period, fields, lambda sample=sample: sample))
     return result
 
 
-def _truth_sample(like: TrueState) -> Any:
+def _truth_sample(example: TrueState) -> Any:
     return VehicleState(
         header(0, WORLD),
-        rotor_speed=like.rotor_speed,
-        motor_voltage=like.motor_voltage,
-        motor_current=like.motor_current,
-        motor_power=like.motor_power,
-        rotor_thrust=like.rotor_thrust,
-        rotor_torque=like.rotor_torque,
+        rotor_speed=example.rotor_speed,
+        motor_voltage=example.motor_voltage,
+        motor_current=example.motor_current,
+        motor_power=example.motor_power,
+        rotor_thrust=example.rotor_thrust,
+        rotor_torque=example.rotor_torque,
     )
 
 
@@ -166,8 +166,8 @@ def _bodies_sample(names: tuple[str, ...]) -> Any:
     )
 
 
-def _contact_sample(like: ContactForces) -> Any:
-    n = len(like.force_world)
+def _contact_sample(example: ContactForces) -> Any:
+    n = len(example.force_world)
     return lapwing.messages.ContactForces(header(0, WORLD), (Point(),) * n, (Vector3(),) * n)
 
 

@@ -20,7 +20,7 @@ from lapwing.kernels import math
 from lapwing.services.common import ports
 from lapwing.services.plant.blocks.carried_load import LoadMotion, LoadPlant
 from lapwing.services.plant.blocks.multirotor import MultirotorPlant
-from lapwing.services.plant.service_config import FleetCoupling, PlantSetup
+from lapwing.services.plant.service_config import FleetCoupling, PlantConfig
 
 PRESENCE, LOAD = "presence", "load"  # ports exchanged between the plants of a fleet
 FASTEST = 0.5  # maximum cable frequency times communication step; the predicted load is then within 2 %
@@ -49,7 +49,7 @@ def couple(shares: Mapping[str, ServiceConfig], keys: Mapping[str, str]) -> dict
         if name == owner:
             load = _load(shares, carriers, keys)
         if neighbours:
-            plant: PlantSetup = shares[name].parameters
+            plant: PlantConfig = shares[name].parameters
             others = FleetCoupling(tuple(neighbours), presence(effects_of(shares[name])), **load)
             result[name] = shares[name]._replace(parameters=plant._replace(others=others))
         if name in carriers and name != owner:
@@ -84,7 +84,7 @@ def _sling(config: ServiceConfig) -> Sling | None:
 
 def _without_bodies(config: ServiceConfig) -> ServiceConfig:
     """Return the plant without the load's output, which another vehicle has."""
-    plant: PlantSetup = config.parameters
+    plant: PlantConfig = config.parameters
     parameters = plant._replace(encoding=plant.encoding._replace(bodies=()))
     return ServiceConfig(parameters, config.inputs, tuple(port for port in config.ports if port.name != ports.BODIES))
 

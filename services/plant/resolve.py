@@ -1,22 +1,41 @@
 """Resolution of a scene into the plant's configuration, by the model of `vehicle.model`."""
 
 from collections.abc import Mapping
+from typing import Any, NamedTuple
 
 from lapwing.cosim.config.run_config import ServiceConfig
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.effects._contact_parameters import GroundContact, GroundContactSmooth
 from lapwing.dynamics.effects.shared_slung_load import SharedSlungLoad
-from lapwing.dynamics.vector import ZERO
+from lapwing.dynamics.vector import ZERO, first, second
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, motion_of
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import map_tuple
 from lapwing.services.common import ports
-from lapwing.services.common.communication_schema import Rates
 from lapwing.services.common.ports import ContactForces
-from lapwing.services.common.vehicle_schema import Vehicle
+from lapwing.services.common.schemas.communication_schema import Rates
+from lapwing.services.common.schemas.vehicle_schema import Vehicle
 from lapwing.services.plant import fleet_coupling, models
-from lapwing.services.plant.blocks.contact import ContactView
 from lapwing.services.plant.blocks.multirotor import MultirotorPlant
 from lapwing.services.plant.models._common import bodies_port, noise_key, rate_ticks
+
+
+class ContactView(NamedTuple):
+    """Parameters of the block."""
+
+    vehicle: MultirotorParameters
+
+
+@always_inline
+def step(p: ContactView, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[ContactForces], int]:
+    """Output position and ground force of each contact point at `tick`."""
+    vehicle, state = p.vehicle, s.vehicle
+    pushes = hooks.all_contact_forces(vehicle.effects, state.memory, motion_of(vehicle.layout, state.motion))
+    return s, (ContactForces(map_tuple(first, 0.0, pushes, pushes), map_tuple(second, 0.0, pushes, pushes)),), CONTINUE
 
 
 def resolve(scene: Scene) -> ServiceConfig:

@@ -9,8 +9,8 @@ from lapwing.dynamics import integrators
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vehicles.multirotor import CONTACT_TOLERANCE
 from lapwing.kernels import math
-from lapwing.services.common.communication_schema import Communication
-from lapwing.services.common.vehicle_schema import Vehicle
+from lapwing.services.common.schemas.communication_schema import Communication
+from lapwing.services.common.schemas.vehicle_schema import Vehicle
 
 CONTACT_SHARE = 3e-5  # fraction of solver.accuracy, for a substep in contact: bounces amplify its errors
 MANY_SUBSTEPS = 1e-4  # accuracy below which the share decreases with the number of substeps, as its fifth root

@@ -22,27 +22,27 @@ from lapwing.services.plant.blocks.multirotor import MultirotorPlantState
 from lapwing.services.plant.blocks.neighbour_state import NeighbourStateOutput
 from lapwing.services.plant.encoders import topic_encoders
 from lapwing.services.plant.fleet_coupling import LOAD, PRESENCE
-from lapwing.services.plant.service_config import FleetCoupling, PlantSetup
+from lapwing.services.plant.service_config import FleetCoupling, PlantConfig
 
 NAME = "plant"
 
 
-def create(setup: RunConfig) -> Service:
+def create(config: RunConfig) -> Service:
     """Return the plant of a run."""
-    config = setup.services[NAME]
-    plant: PlantSetup = config.parameters
+    settings = config.services[NAME]
+    plant: PlantConfig = settings.parameters
     state = Cell(plant.start)
-    bodies = [port for port in config.ports if port.name == ports.BODIES]
-    feet = tuple(port for port in config.ports if port.name == ports.CONTACT)
-    truth_ports = tuple(port for port in config.ports if port not in bodies and port not in feet)
+    bodies = [port for port in settings.ports if port.name == ports.BODIES]
+    feet = tuple(port for port in settings.ports if port.name == ports.CONTACT)
+    truth_ports = tuple(port for port in settings.ports if port not in bodies and port not in feet)
     has_own_bodies = plant.model == "cooperative_load"  # the plant's block outputs the bodies
     part = Block(
         NAME,
         plant.core,
         state,
-        config.inputs,
-        config.ports if has_own_bodies else truth_ports,
-        failure=_divergence_error(setup, plant, state),
+        settings.inputs,
+        settings.ports if has_own_bodies else truth_ports,
+        failure=_divergence_error(config, plant, state),
     )
     parts: list[Any] = [part]
     if plant.events:
@@ -50,15 +50,15 @@ def create(setup: RunConfig) -> Service:
     if plant.others:
         parts = _with_neighbours(plant, plant.others, parts, state, bodies)
     if bodies and plant.bodies and not has_own_bodies:
-        inputs = config.inputs[:1]
+        inputs = settings.inputs[:1]
         parts.append(Block(f"{NAME}.bodies", plant.bodies, state, inputs, tuple(bodies), bodies[0].period))
     if plant.contact:
         parts.append(Block(f"{NAME}.contact", plant.contact, state, (InputPort(ports.TRUTH),), feet, feet[0].period))
-    return Service(NAME, parts, topic_encoders(setup, plant.encoding))
+    return Service(NAME, parts, topic_encoders(config, plant.encoding))
 
 
 def _with_neighbours(
-    plant: PlantSetup, others: FleetCoupling, parts: list[Any], state: Cell, bodies: list[Port]
+    plant: PlantConfig, others: FleetCoupling, parts: list[Any], state: Cell, bodies: list[Port]
 ) -> list[Any]:
     """Return the plant's blocks between the effects of its neighbours and its own neighbour state."""
     vehicle, interval = plant.core.vehicle, plant.core.interval
@@ -80,9 +80,9 @@ def _delayed_inputs(*names: str) -> tuple[InputPort, ...]:
     return tuple(InputPort(name, 1) for name in names)
 
 
-def _divergence_error(setup: RunConfig, plant: PlantSetup, state: Cell) -> Any:
+def _divergence_error(config: RunConfig, plant: PlantConfig, state: Cell) -> Any:
     def error(tick: int) -> DivergedError:
-        x, t = read(state), tick * setup.interval
+        x, t = read(state), tick * config.interval
         if plant.euler and (body := multirotor_euler.singular(x.vehicle.motion)) >= 0:
             return DivergedError(
                 f"the multirotor: {plant.encoding.bodies[body]}: pitch reached 90 degrees by t = {t:g} s, where "
@@ -107,16 +107,16 @@ class PropellerFailures:
     name = f"{NAME}.failures"
     outputs = ()
 
-    def __init__(self, plant: PlantSetup):
+    def __init__(self, plant: PlantConfig):
         self._steps = {tick: tuple(events) for tick, events in groupby(plant.events, lambda event: event.tick)}
         self._form = multirotor_euler if plant.euler else multirotor_multibody
         self._core, self._bodies = plant.core, plant.bodies
         self.events = [tick + 1 for tick in self._steps]
         self.replacements: dict[int, list[tuple[Block, BoundBlock]]] = {}
 
-    def bind(self, graph: BlockDiagram) -> None:
+    def bind(self, diagram: BlockDiagram) -> None:
         """Compile the plants of all failures before the first tick."""
-        self._graph, core = graph, self._core
+        self._diagram, core = diagram, self._core
         for tick, events in self._steps.items():
             failures, p = [], core.vehicle
             for event in events:
@@ -128,8 +128,8 @@ class PropellerFailures:
             self.replacements[tick + 1] = [self._prepare(NAME, failing), self._prepare(f"{NAME}.bodies", view)]
 
     def _prepare(self, name: str, parameters: Any) -> tuple[Block, BoundBlock]:
-        part = replace(self._graph.part(name), parameters=parameters)
-        return part, self._graph.prepare(part)
+        part = replace(self._diagram.part(name), parameters=parameters)
+        return part, self._diagram.prepare(part)
 
     def on_tick(self, tick: int) -> int:
         """Replace the plant of the step to `tick` by one with failures, and that of the step after it by one without.
@@ -137,5 +137,5 @@ class PropellerFailures:
         The plant of a step starts from the state that has been output.
         """
         for block, code in self.replacements.pop(tick, []):
-            self._graph.replace(block, code)
+            self._diagram.replace(block, code)
         return min(self.replacements, default=NEVER)

@@ -25,7 +25,7 @@ class FleetCoupling(NamedTuple):
     load_inputs: tuple[str, ...] = ()  # neighbour-state ports of its carriers
 
 
-class PlantSetup(NamedTuple):
+class PlantConfig(NamedTuple):
     """Configuration of a plant."""
 
     model: str  # name of the plant model

@@ -10,25 +10,33 @@ from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import python_function
 from lapwing.services.common import ports
-from lapwing.services.common.communication_schema import ticks
-from lapwing.services.common.environment_schema import environment
+from lapwing.services.common.firmware.firmware_config import firmware_config, fleet, latencies
 from lapwing.services.common.firmware.mission import with_mission
 from lapwing.services.common.firmware.schema import firmware_of
-from lapwing.services.common.firmware.setup import firmware_config, fleet
 from lapwing.services.common.mavlink.geo_coordinates import Datum
-from lapwing.services.common.vehicle_schema import gravity, start_height, start_pose
+from lapwing.services.common.schemas.communication_schema import ticks
+from lapwing.services.common.schemas.environment_schema import environment
+from lapwing.services.common.schemas.vehicle_schema import gravity, start_height, start_pose
 from lapwing.services.px4.schema import Px4
 
 __all__ = ["fleet", "resolve"]
 NAME = "px4"
 REQUIRED = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.GPS)
-BATTERIES = ("battery", "battery_thevenin")  # effects that model the charge
+DELAYS = {  # parameters [ms] of the delay of each sensor; of GPS also the name before PX4 1.17
+    ports.GPS: ("SENS_GPS0_DELAY", "EKF2_GPS_DELAY"),
+    ports.BAROMETER: ("EKF2_BARO_DELAY",),
+    ports.MAGNETOMETER: ("EKF2_MAG_DELAY",),
+    ports.AIRSPEED: ("EKF2_ASP_DELAY",),
+    ports.RANGEFINDER: ("EKF2_RNG_DELAY",),
+}
+DELAY_MAX = 200.0  # [ms] EKF2_DELAY_MAX of PX4, which no delay may exceed
+IMU_RATES = (100, 200, 250, 400)  # [Hz] values of IMU_INTEG_RATE
 OPTIONAL = (ports.AIRSPEED, ports.RANGEFINDER, ports.SONAR)
 _rotate_back = python_function(quaternion.rotate_back)
 _pressure = python_function(atmosphere.pressure)
 
 
-class Px4Setup(NamedTuple):
+class Px4Config(NamedTuple):
     """Resolved values of the adapter."""
 
     datum: Datum  # origin of the mission
@@ -36,7 +44,7 @@ class Px4Setup(NamedTuple):
     force_body: Vec3  # [m/s^2] specific force at rest at the start
     field_body: Vec3  # [T] magnetic field there
     pressure: float  # [Pa] there
-    battery: bool = False  # the scene models the battery: PX4 gets its state instead of its own simulation
+    parameters: dict[str, float]  # PX4 parameters that describe the scene's sensors and battery
 
 
 def resolve(scene: Scene) -> ServiceConfig | None:
@@ -54,12 +62,23 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     sensors = [*REQUIRED, *(name for name in OPTIONAL if name in tables)]
     periods = {name: ticks(scene, scene.lookup(f"sensors.{name}.rate"), name) for name in sensors}
     here, (position, attitude) = environment(scene), start_pose(scene)
-    own = Px4Setup(
+    own = Px4Config(
         Datum(here.home, start_height(scene), start_height(scene)),
         periods,
         _rotate_back(attitude, (0.0, 0.0, gravity(scene))),
         _rotate_back(attitude, here.magnetic_field_world),
         _pressure(here.atmosphere, here.home.height + position[2]),
-        any(name in scene.tables("effects") for name in BATTERIES),
+        sensor_parameters(scene),
     )
     return with_mission(scene, Px4, firmware_config(scene, tuple(sensors), periods[ports.IMU], own))
+
+
+def sensor_parameters(scene: Scene) -> dict[str, float]:
+    """Return the PX4 parameters that describe the scene: delays of its sensors, rate of its IMU.
+
+    SIM_BAT_ENABLE = 0: PX4 gets the state of the plant's battery instead of its own simulation.
+    """
+    delays = latencies(scene, DELAYS)
+    result = {"SIM_BAT_ENABLE": 0.0, "EKF2_DELAY_MAX": max(DELAY_MAX, *delays.values()), **delays}
+    rate = scene.lookup(f"sensors.{ports.IMU}.rate")
+    return result | ({"IMU_INTEG_RATE": rate} if rate in IMU_RATES else {})

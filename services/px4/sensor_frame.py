@@ -10,29 +10,32 @@ import numpy as np
 
 from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import always_inline, kernel, math
-from lapwing.services.px4.framing import V2, checksum
-from lapwing.services.px4.messages import (
-    ACCELEROMETER,
-    AIRSPEED,
-    BAROMETER,
-    GYRO,
-    HIL_ACTUATOR_CONTROLS,
-    HIL_SENSOR,
-    MAGNETOMETER,
-    TEMPERATURE,
-)
+from lapwing.services.common.mavlink.dialect import mavlink
 
 SYSTEM, COMPONENT = 1, 51  # ids of the simulator; PX4 does not check them
 NONE = (math.nan, math.nan, math.nan)  # no new reading
-_HEAD, _MASK, _END = 10, 60, 65  # [bytes] size of a header; offset of fields_updated; length of HIL_SENSOR
-_CONTROLS_END = HIL_ACTUATOR_CONTROLS.fields.size
-_SENSOR, _SENSOR_EXTRA = HIL_SENSOR.number, HIL_SENSOR.extra
-_CONTROLS, _CONTROLS_EXTRA = HIL_ACTUATOR_CONTROLS.number, HIL_ACTUATOR_CONTROLS.extra
-_CRC = np.array([checksum(bytes([byte]), 0) for byte in range(256)], np.int64)  # change of the checksum by each byte
+ACCELEROMETER, GYRO, MAGNETOMETER, BAROMETER, AIRSPEED = 0x7, 0x38, 0x1C0, 0x1A00, 0x400  # fields_updated
+TEMPERATURE = 25.0  # [degC] of the sensors, which are not modelled
+_MAGIC, _HEAD = mavlink.PROTOCOL_MARKER_V2, 10  # first byte of a frame; [bytes] before the payload
+_SENSOR = mavlink.MAVLink_hil_sensor_message
+_CONTROLS = mavlink.MAVLink_hil_actuator_controls_message
+_SENSOR_ID, _SENSOR_EXTRA, _SENSOR_SIZE = _SENSOR.id, _SENSOR.crc_extra, _SENSOR.unpacker.size
+_CONTROLS_ID, _CONTROLS_EXTRA, _CONTROLS_SIZE = _CONTROLS.id, _CONTROLS.crc_extra, _CONTROLS.unpacker.size
 
 
-class Payload(NamedTuple):
-    """Views of the payload of a message, 88 bytes."""
+def _change(byte: int) -> int:
+    """Return the change of the checksum by a byte."""
+    crc = mavlink.x25crc()
+    crc.crc = 0
+    crc.accumulate(bytes([byte]))
+    return int(crc.crc)
+
+
+_CRC = np.array([_change(byte) for byte in range(256)], np.int64)
+
+
+class Frame(NamedTuple):
+    """Bytes of a frame, and views of its payload, which is aligned."""
 
     bytes: Any
     words: Any  # int64
@@ -50,10 +53,11 @@ class Sensors(NamedTuple):
     dynamic_pressure: float = math.nan  # [Pa]
 
 
-def payload() -> Payload:
-    """Return the memory of a payload."""
-    data = np.zeros(88, np.uint8)
-    return Payload(data, data.view(np.int64), data.view(np.int32), data.view(np.float32))
+def frame(data: Any = None) -> Frame:
+    """Return the views of a frame at the begin of `data`, such as `Channel.sent`, or of memory of its own."""
+    data = np.zeros(112, np.uint8)[6:] if data is None else data
+    payload = data[_HEAD : _HEAD + 88]
+    return Frame(data, payload.view(np.int64), payload.view(np.int32), payload.view(np.float32))
 
 
 @always_inline
@@ -63,7 +67,7 @@ def pressure_altitude(pressure: float) -> float:
 
 
 @always_inline
-def _put(m: Payload, first: int, v: Vec3, factor: float, bits: int) -> int:
+def _put(m: Frame, first: int, v: Vec3, factor: float, bits: int) -> int:
     """Write a vector in FRD. Return its bits of fields_updated, 0 if it has no new reading."""
     if math.isnan(v[0]):
         m.floats[first] = m.floats[first + 1] = m.floats[first + 2] = 0.0
@@ -73,24 +77,25 @@ def _put(m: Payload, first: int, v: Vec3, factor: float, bits: int) -> int:
 
 
 @always_inline
-def _crc(data: Any, first: int, stop: int, extra: int) -> int:
+def _crc(data: Any, stop: int, extra: int) -> int:
+    """Return the checksum of a frame up to `stop`."""
     crc = 0xFFFF
-    for k in range(first, stop):
+    for k in range(1, stop):
         crc = crc >> 8 ^ _CRC[(crc ^ data[k]) & 0xFF]
     return crc >> 8 ^ _CRC[(crc ^ extra) & 0xFF]
 
 
 @always_inline
-def write_sensors(out: Any, m: Payload, sequence: int, time_us: int, s: Sensors) -> int:
+def write_sensors(m: Frame, sequence: int, time_us: int, s: Sensors) -> int:
     """Write the frame of HIL_SENSOR: FRD, gauss and hPa; id 0, which sets PX4's clock. Return its length [bytes].
 
     Args:
-        out: buffer of bytes.
-        m: memory for the payload.
+        m: frame.
         sequence: number of the frame, 0 to 255.
         time_us: time [us].
         s: readings.
     """
+    out = m.bytes
     m.words[0] = time_us
     mask = _put(m, 2, s.specific_force_body, 1.0, ACCELEROMETER) | _put(m, 5, s.omega_body, 1.0, GYRO)
     mask |= _put(m, 8, s.field_body, 1e4, MAGNETOMETER)
@@ -103,41 +108,39 @@ def write_sensors(out: Any, m: Payload, sequence: int, time_us: int, s: Sensors)
         mask |= AIRSPEED
     m.floats[14] = TEMPERATURE
     m.integers[15] = mask
-    m.bytes[64] = 0
-    size = _END
-    while size > 1 and m.bytes[size - 1] == 0:
+    size = _SENSOR_SIZE
+    out[_HEAD + size - 1] = 0  # id
+    while size > 1 and out[_HEAD + size - 1] == 0:
         size -= 1
-    out[0], out[1], out[2], out[3], out[4] = V2, size, 0, 0, sequence
-    out[5], out[6], out[7], out[8], out[9] = SYSTEM, COMPONENT, _SENSOR, 0, 0
-    for k in range(size):
-        out[_HEAD + k] = m.bytes[k]
-    crc = _crc(out, 1, _HEAD + size, _SENSOR_EXTRA)
+    out[0], out[1], out[2], out[3], out[4] = _MAGIC, size, 0, 0, sequence
+    out[5], out[6], out[7], out[8], out[9] = SYSTEM, COMPONENT, _SENSOR_ID, 0, 0
+    crc = _crc(out, _HEAD + size, _SENSOR_EXTRA)
     out[_HEAD + size], out[_HEAD + size + 1] = crc & 0xFF, crc >> 8
     return _HEAD + size + 2
 
 
 @always_inline
-def read_controls(data: Any, size: int, m: Payload) -> bool:
-    """Read the payload of HIL_ACTUATOR_CONTROLS. Return False unless the bytes are exactly one valid frame of it."""
+def read_controls(data: Any, size: int, m: Frame) -> bool:
+    """Copy HIL_ACTUATOR_CONTROLS into `m`. Return False unless the bytes are exactly one valid frame of it."""
     length = size - _HEAD - 2
-    if length < 1 or length > _CONTROLS_END or data[0] != V2 or data[1] != length or data[2] != 0:
+    if length < 1 or length > _CONTROLS_SIZE or data[0] != _MAGIC or data[1] != length or data[2] != 0:
         return False
-    if data[7] != _CONTROLS or data[8] != 0 or data[9] != 0:
+    if data[7] != _CONTROLS_ID or data[8] != 0 or data[9] != 0:
         return False
-    crc = _crc(data, 1, size - 2, _CONTROLS_EXTRA)
+    crc = _crc(data, size - 2, _CONTROLS_EXTRA)
     if data[size - 2] != crc & 0xFF or data[size - 1] != crc >> 8:
         return False
-    for k in range(_CONTROLS_END):
-        m.bytes[k] = data[_HEAD + k] if k < length else 0
+    for k in range(_HEAD, _HEAD + _CONTROLS_SIZE):
+        m.bytes[k] = data[k] if k < size - 2 else 0
     return True
 
 
 @kernel
-def _write(out: Any, m: Any, sequence: int, time_us: int, s: Any) -> int:
-    return write_sensors(out, m, sequence, time_us, s)
+def _write(m: Any, sequence: int, time_us: int, s: Any) -> int:
+    return write_sensors(m, sequence, time_us, s)
 
 
 def sensor_frame(sequence: int, time_us: int, s: Sensors) -> bytes:
     """Return the frame of HIL_SENSOR; see `write_sensors`."""
-    out = np.zeros(_HEAD + _END + 2, np.uint8)
-    return out[: _write(out, payload(), sequence, time_us, s)].tobytes()
+    m = frame()
+    return m.bytes[: _write(m, sequence, time_us, s)].tobytes()  # type: ignore[no-any-return]

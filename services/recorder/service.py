@@ -31,17 +31,17 @@ def run(process: Participant, spec: Any) -> None:
         LockStepError: a log packet is missing, or a participant did not appear or confirm.
         ValueError: the log cannot be written.
     """
-    setup = process.setup
+    config = process.config
     senders: dict[str, bytes | None] = {}
     late: dict[str, Lateness] = {}
     for key in (BATCH_KEY, DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY, REPORTS_KEY):
-        senders |= process.participants.senders(key, setup.services)
-    pending = Pending(setup.services)
+        senders |= process.participants.senders(key, config.services)
+    pending = Pending(config.services)
     messages = process.bus.receive(senders)
-    log_metadata = metadata(setup, spec.mode) | ({"external": ", ".join(spec.external)} if spec.external else {})
+    log_metadata = metadata(config, spec.mode) | ({"external": ", ".join(spec.external)} if spec.external else {})
     progress = LogProgressPublisher(process.bus, process.key_prefix, process.name)
-    with LogWriter(Path(spec.log), log_metadata, attachments(setup, spec.sources or {}), progress.waiting) as writer:
-        recording = Recording(writer, setup)
+    with LogWriter(Path(spec.log), log_metadata, attachments(config, spec.sources or {}), progress.waiting) as writer:
+        recording = Recording(writer, config)
         try:
             process.join()
             while not pending.ended:
@@ -58,7 +58,7 @@ def run(process: Participant, spec: Any) -> None:
                         text = payload.decode(errors="replace")  # the first cause counts
                         writer.metadata = failure(text, head == DIVERGED_KEY) | writer.metadata
                     continue
-                pending.add(name, payload, time_ns // setup.interval_ns)
+                pending.add(name, payload, time_ns // config.interval_ns)
                 pages = pending.complete()
                 if pages:
                     recording.write(pages, pending.written - 1)

@@ -26,18 +26,18 @@ def run(process: Participant, spec: Any) -> None:
     Raises:
         ValueError: the node cannot reach or open a Zenoh router.
     """
-    setup = process.setup
+    config = process.config
     topics, senders = {}, {}
-    for name in setup.services:
+    for name in config.services:
         for topic in process.create_service(name).topics:
             topics[process.key(topic)] = topic
             senders[process.key(topic)] = process.participants.encoder_gid(name)
-    commands_by_topic = {topic: commands for commands in _commands(setup) for topic in commands.messages}
+    commands_by_topic = {topic: commands for commands in _commands(config) for topic in commands.messages}
     operate = process.bus.publisher(f"{process.key_prefix}/{OPERATOR_KEY}/{process.name}")
     with Node(spec.ros2, spec.ros2_router, spec.insecure) as node:
         for topic in topics.values():
-            node.declare(topic.key(setup.vehicle), topic.message.type_name)
-        events = {EVENTS.zenoh_key(name, process.key_prefix): of_vehicle(EVENTS, name) for name in setup.vehicles}
+            node.declare(topic.key(config.vehicle), topic.message.type_name)
+        events = {EVENTS.zenoh_key(name, process.key_prefix): of_vehicle(EVENTS, name) for name in config.vehicles}
         for topic in events.values():
             node.declare(topic.key(), topic.message.type_name)
         subscription = node.subscribe(
@@ -59,17 +59,17 @@ def run(process: Participant, spec: Any) -> None:
                 continue
             key, time_ns, payload = message
             if payload:
-                node.put(topics[key].key(setup.vehicle), time_ns, payload)
+                node.put(topics[key].key(config.vehicle), time_ns, payload)
             else:
                 unfinished.discard(key)
                 open_events.discard(key)
         process.confirm()
     for commands in dict.fromkeys(commands_by_topic.values()):
         if report := commands.report():
-            print(report if setup.vehicle else f"{commands.vehicle}: {report}", flush=True)
+            print(report if config.vehicle else f"{commands.vehicle}: {report}", flush=True)
 
 
-def _commands(setup: RunConfig) -> list[Commands]:
+def _commands(config: RunConfig) -> list[Commands]:
     """Return the conversions of all vehicles with `autopilot.accept_commands`."""
-    with_autopilot = [member for member in members(setup) if "autopilot" in member.services]
+    with_autopilot = [member for member in members(config) if "autopilot" in member.services]
     return [Commands(member.vehicle) for member in with_autopilot if member.services["autopilot"].parameters.operator]

@@ -26,9 +26,9 @@ class Airspeed(NamedTuple):
     noise_pa_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [Pa/sqrt(Hz)] one-sided density
     turn_on_bias_pa: Annotated[float, Ge(0)] = 0.0  # [Pa] one standard deviation
     scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio, one standard deviation
-    range_pa: Annotated[float, Gt(0)] = math.inf  # [Pa]
-    resolution_pa: Annotated[float, Ge(0)] = 0.0  # [Pa]
-    rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
+    range_pa: Annotated[float, Gt(0)] = math.inf  # [Pa] largest measurable pressure
+    resolution_pa: Annotated[float, Ge(0)] = 0.0  # [Pa] step of a reading
+    rate: Annotated[float, Gt(0)] = 50.0  # [Hz] readings a second
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 

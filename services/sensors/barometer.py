@@ -41,15 +41,15 @@ class Barometer(NamedTuple):
     bias_correlation_time: Annotated[float, Gt(0)] = 1000.0  # [s] correlation time of the bias walk
     turn_on_bias_pa: Annotated[float, Ge(0)] = 0.0  # [Pa] one standard deviation
     scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio, one standard deviation
-    range_pa: Annotated[float, Gt(0)] = math.inf  # [Pa]
-    resolution_pa: Annotated[float, Ge(0)] = 0.0  # [Pa]
-    rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
+    range_pa: Annotated[float, Gt(0)] = math.inf  # [Pa] largest measurable pressure
+    resolution_pa: Annotated[float, Ge(0)] = 0.0  # [Pa] step of a reading
+    rate: Annotated[float, Gt(0)] = 50.0  # [Hz] readings a second
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
     static_pressure_error: StaticPressureError | None = None  # by wind and own motion; default: none
     wash_pa_per_n: Annotated[float, Ge(-10), Le(10)] = 0.0  # [Pa/N] pressure change over the rotors' thrust
     temperature_pa_per_k: Annotated[float, Ge(0)] = 0.0  # [Pa/K] residual after calibration, one standard deviation
     warm_up_rise: Annotated[float, Ge(-200), Le(200)] = 0.0  # [K] temperature rise after the start
-    warm_up_time: Annotated[float, Gt(0)] = 100.0  # [s]
+    warm_up_time: Annotated[float, Gt(0)] = 100.0  # [s] time constant of the warming
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 
 

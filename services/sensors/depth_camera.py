@@ -25,16 +25,16 @@ SEES_VEHICLES = True
 class DepthCamera(NamedTuple):
     """Parameters of a pinhole camera."""
 
-    width: Annotated[int, Gt(0), Le(640)] = 80  # [pixel]
-    height: Annotated[int, Gt(0), Le(480)] = 60  # [pixel]
+    width: Annotated[int, Gt(0), Le(640)] = 80  # [pixel] columns of an image
+    height: Annotated[int, Gt(0), Le(480)] = 60  # [pixel] rows of an image
     field_of_view_deg: Annotated[float, Gt(0), Lt(179)] = 87.0  # [deg] horizontal
     pitch_deg: Annotated[float, Ge(-90), Le(90)] = 0.0  # [deg] of the axis below body x; 90: down
     position: Place = ZERO  # [m] body
     noise: Annotated[float, Ge(0)] = 0.0  # [m] standard deviation of a distance along a ray
     range_min: Annotated[float, Ge(0)] = 0.0  # [m] along a ray
     range_max: Annotated[float, Gt(0), Le(1e4)] = 100.0  # [m] along a ray
-    resolution: Annotated[float, Ge(0)] = 0.0  # [m]
-    rate: Annotated[float, Gt(0)] = 10.0  # [Hz]
+    resolution: Annotated[float, Ge(0)] = 0.0  # [m] step of a reading
+    rate: Annotated[float, Gt(0)] = 10.0  # [Hz] images a second
 
 
 @kernel

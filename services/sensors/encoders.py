@@ -56,9 +56,9 @@ class GpsEncoding(NamedTuple):
     detailed: bool = False  # kind of fix, satellites and dilution of precision are modelled
 
 
-def topic_encoders(setup: RunConfig, sonar: SonarEncoding | None, gps: GpsEncoding) -> list[TopicEncoder]:
+def topic_encoders(config: RunConfig, sonar: SonarEncoding | None, gps: GpsEncoding) -> list[TopicEncoder]:
     """Return the encoders of the vehicle's sensors in `PORTS`."""
-    frame, port_of = setup.vehicle, setup.ports
+    frame, port_of = config.vehicle, config.ports
     known: list[tuple[Any, str, Callable, Any]] = [
         (topic.IMU, ports.IMU, _imu, Imu(header(0, frame), orientation_covariance=(UNKNOWN,) + (0.0,) * 8)),
         (topic.MAG, ports.MAGNETOMETER, _magnetometer, MagneticField(header(0, frame))),

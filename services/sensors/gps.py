@@ -39,25 +39,25 @@ class Outage(NamedTuple):
     """A circle of the ground over which there is no fix."""
 
     x: Distance  # [m] world, of its centre
-    y: Distance  # [m]
-    radius: Annotated[float, Gt(0), Le(1e6)]  # [m]
+    y: Distance  # [m] world y of the middle
+    radius: Annotated[float, Gt(0), Le(1e6)]  # [m] of the region
 
 
 class Gps(NamedTuple):
     """Parameters of a receiver; horizontal values are per axis."""
 
     noise_horizontal_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)] one-sided density
-    noise_vertical_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)]
-    noise_velocity_m_per_s_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/s/sqrt(Hz)]
+    noise_vertical_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)] density of the altitude's noise
+    noise_velocity_m_per_s_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/s/sqrt(Hz)] density of the velocity
     correlated_error_horizontal: Annotated[float, Ge(0)] = 0.0  # [m] standard deviation, correlated in time
-    correlated_error_vertical: Annotated[float, Ge(0)] = 0.0  # [m]
+    correlated_error_vertical: Annotated[float, Ge(0)] = 0.0  # [m] standard deviation of the slow error of the altitude
     correlation_time: Annotated[float, Gt(0)] = 60.0  # [s] of the correlated errors
     sky: tuple[Satellite, ...] | None = None  # fixed satellites in view, whose range errors replace the above
     constellation: Constellation | None = None  # satellites on orbits, instead of `sky`
     range_noise_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)] of the distance to a satellite
     range_correlated_error: Annotated[float, Ge(0)] = 0.0  # [m] time-correlated error of the distance to a satellite
     fix_status: Annotated[int, Ge(0), Le(2)] = 0  # NavSatStatus: 0 plain, 1 SBAS, 2 with a ground station (RTK)
-    rate: Annotated[float, Gt(0)] = 10.0  # [Hz]
+    rate: Annotated[float, Gt(0)] = 10.0  # [Hz] readings a second
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
     antenna: Place | None = None  # [m] body; default: centre of mass
     rtk: Rtk | None = None  # single, float and fixed solutions; default: always `fix_status`

@@ -39,11 +39,11 @@ class Imu(NamedTuple):
 
     gyro: Gyro = Gyro()  # errors of the gyroscopes
     accelerometer: Accelerometer = Accelerometer()  # errors of the accelerometers
-    rate: Annotated[float, Gt(0)] = 250.0  # [Hz]
+    rate: Annotated[float, Gt(0)] = 250.0  # [Hz] readings a second
     instances: Annotated[int, Ge(1), Le(3)] = 1  # redundant units, with a vote in the autopilot; `faults` of the first
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
     warm_up_rise: float = 0.0  # [K] temperature rise from the start to the calibrated temperature
-    warm_up_time: Annotated[float, Gt(0)] = 100.0  # [s]
+    warm_up_time: Annotated[float, Gt(0)] = 100.0  # [s] time constant of the warming
     delta_output: bool = False  # readings are means over the sampling interval (delta angle and velocity)
     vibration: Vibration | None = None  # of the rotors, at their mean speed; default: none
     gyro_filter: LowPass | None = None  # between the gyroscopes and the output

@@ -34,10 +34,10 @@ class Lidar(NamedTuple):
     elevation_max_deg: Annotated[float, Ge(-90), Le(90)] = 0.0  # [deg] of the highest ring
     position: Place = ZERO  # [m] body
     noise: Annotated[float, Ge(0)] = 0.0  # [m] standard deviation of a distance
-    range_min: Annotated[float, Ge(0)] = 0.0  # [m]
-    range_max: Annotated[float, Gt(0), Le(1e4)] = 100.0  # [m]
-    resolution: Annotated[float, Ge(0)] = 0.0  # [m]
-    rate: Annotated[float, Gt(0)] = 10.0  # [Hz]
+    range_min: Annotated[float, Ge(0)] = 0.0  # [m] smallest measurable distance
+    range_max: Annotated[float, Gt(0), Le(1e4)] = 100.0  # [m] largest measurable distance
+    resolution: Annotated[float, Ge(0)] = 0.0  # [m] step of a reading
+    rate: Annotated[float, Gt(0)] = 10.0  # [Hz] scans a second
 
 
 def check(p: Lidar) -> None:

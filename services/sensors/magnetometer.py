@@ -27,11 +27,11 @@ class Magnetometer(NamedTuple):
     bias_correlation_time: Annotated[float, Gt(0)] = 500.0  # [s] correlation time of the bias walk
     hard_iron_nt: Annotated[float, Ge(0)] = 0.0  # [nT] residual after calibration
     scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio
-    misalignment_deg: Annotated[float, Ge(0), Lt(45)] = 0.0  # [deg]
+    misalignment_deg: Annotated[float, Ge(0), Lt(45)] = 0.0  # [deg] standard deviation of an axis's direction
     soft_iron: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio, elements of the residual symmetric matrix
-    range_ut: Annotated[float, Gt(0)] = math.inf  # [uT]
-    resolution_nt: Annotated[float, Ge(0)] = 0.0  # [nT]
-    rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
+    range_ut: Annotated[float, Gt(0)] = math.inf  # [uT] largest measurable field
+    resolution_nt: Annotated[float, Ge(0)] = 0.0  # [nT] step of a reading
+    rate: Annotated[float, Gt(0)] = 50.0  # [Hz] readings a second
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
     current_nt_per_a: tuple[Disturbance, Disturbance, Disturbance] = ZERO  # [nT/A] body, by the motors' total current
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule

@@ -34,7 +34,7 @@ class OpticalFlow(NamedTuple):
     flow_max: Annotated[float, Gt(0)] = math.inf  # [rad/s] maximum flow at which texture is tracked
     range_min: Annotated[float, Ge(0)] = 0.0  # [m] shortest distance in focus
     range_max: Annotated[float, Gt(0)] = math.inf  # [m] longest distance with visible texture
-    rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
+    rate: Annotated[float, Gt(0)] = 50.0  # [Hz] readings a second
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 

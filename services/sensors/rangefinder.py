@@ -36,11 +36,11 @@ class Rangefinder(NamedTuple):
     position: Place = ZERO  # [m] body
     noise_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)] one-sided density
     scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio, one standard deviation
-    range_min: Annotated[float, Ge(0)] = 0.0  # [m]
-    range_max: Annotated[float, Gt(0)] = math.inf  # [m]
-    resolution: Annotated[float, Ge(0)] = 0.0  # [m]
+    range_min: Annotated[float, Ge(0)] = 0.0  # [m] smallest measurable distance
+    range_max: Annotated[float, Gt(0)] = math.inf  # [m] largest measurable distance
+    resolution: Annotated[float, Ge(0)] = 0.0  # [m] step of a reading
     beam_deg: Annotated[float, Ge(0), Lt(90)] = 0.0  # [deg] full angle, published but not modelled
-    rate: Annotated[float, Gt(0)] = 50.0  # [Hz]
+    rate: Annotated[float, Gt(0)] = 50.0  # [Hz] readings a second
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule
 

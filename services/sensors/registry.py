@@ -8,11 +8,11 @@ from functools import cache
 from types import ModuleType
 from typing import Any
 
-from pydantic import TypeAdapter, ValidationError
+from pydantic import TypeAdapter
 
 import lapwing.services.sensors
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.validation import fault
+from lapwing.dynamics.validation import validated
 from lapwing.services.sensors import fault_schedule
 
 NO_SENSORS = ("schema", "registry", "service")  # modules of the folder that import this one
@@ -65,7 +65,7 @@ def parameters(sensor: str, table: Mapping[str, Any], tick: float) -> Any:
     faults: Sequence[Mapping[str, Any]] = values.pop("faults", ())
     kind: Any = type(preset)
     try:
-        p = _adapter(kind).validate_python(_merge(preset, values))
+        p = validated(_adapter(kind).validate_python, _merge(preset, values), kind)
         _check_limits(p)
         if hasattr(module, "check"):
             module.check(p)
@@ -74,8 +74,6 @@ def parameters(sensor: str, table: Mapping[str, Any], tick: float) -> Any:
                 raise ConfigError("faults", f"{sensor} has no fault model; remove them")
             return p
         return p._replace(faults=fault_schedule.compile_faults(faults, module.CHANNELS, tick))
-    except ValidationError as error:
-        raise fault(error, type(preset)).with_prefix(sensor) from None
     except ConfigError as error:
         raise error.with_prefix(sensor) from None
 

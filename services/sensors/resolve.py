@@ -20,10 +20,10 @@ from lapwing.dynamics.terrain.ray_casting import as_relief, steepness
 from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles.visible_body import VisibleBody, visible_body
 from lapwing.services.common import ports
-from lapwing.services.common.communication_schema import Communication, ticks
-from lapwing.services.common.environment_schema import environment
-from lapwing.services.common.run_schema import Run
-from lapwing.services.common.vehicle_schema import Vehicle, VehicleAirframe, airframe, gravity
+from lapwing.services.common.schemas.communication_schema import Communication, ticks
+from lapwing.services.common.schemas.environment_schema import environment
+from lapwing.services.common.schemas.run_schema import Run
+from lapwing.services.common.schemas.vehicle_schema import Vehicle, VehicleAirframe, airframe, gravity
 from lapwing.services.sensors.block import Instrument
 from lapwing.services.sensors.encoders import GpsEncoding, SonarEncoding
 from lapwing.services.sensors.gps import Gps
@@ -33,7 +33,7 @@ from lapwing.services.sensors.rotor_vibration import Damage
 from lapwing.services.sensors.scan import ScanPose, VehiclePose
 from lapwing.services.sensors.schema import Sensors
 from lapwing.services.sensors.sensor_inputs import OtherVehicle, Truth
-from lapwing.services.sensors.service import SensorsSetup
+from lapwing.services.sensors.service import SensorsConfig
 
 READINGS = {
     ports.IMU: ports.ImuReading(),
@@ -70,7 +70,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
             key = stream_key(scene[Run].seed, scene[Vehicle].name, unit)
             instruments.append(Instrument(p._replace(faults=None), key, gravity(scene), environment(scene)))
             outputs.append(outputs[-1]._replace(name=unit))
-    return ServiceConfig(SensorsSetup(tuple(instruments), sonar, gps), (InputPort(ports.TRUTH),), tuple(outputs))
+    return ServiceConfig(SensorsConfig(tuple(instruments), sonar, gps), (InputPort(ports.TRUTH),), tuple(outputs))
 
 
 def _with_damage(scene: Scene, p: Imu) -> Imu:
@@ -105,33 +105,33 @@ def fleet(
     }
 
 
-def _with_others(config: ServiceConfig, bodies: Mapping[str, VisibleBody]) -> ServiceConfig:
-    setup: SensorsSetup = config.parameters
-    seeing = [_sees_vehicles(sys.modules[type(i.sensor).__module__]) for i in setup.instruments]
+def _with_others(settings: ServiceConfig, bodies: Mapping[str, VisibleBody]) -> ServiceConfig:
+    config: SensorsConfig = settings.parameters
+    seeing = [_sees_vehicles(sys.modules[type(i.sensor).__module__]) for i in config.instruments]
     if not bodies or not any(seeing):
-        return config
+        return settings
     instruments, outputs = [], []
-    for sees, instrument, port in zip(seeing, setup.instruments, config.ports, strict=True):
+    for sees, instrument, port in zip(seeing, config.instruments, settings.ports, strict=True):
         instruments.append(instrument._replace(others=tuple(bodies.values())) if sees else instrument)
-        if isinstance(port.like, ScanPose):
-            port = port._replace(like=port.like._replace(others=(VehiclePose(),) * len(bodies)))
+        if isinstance(port.example, ScanPose):
+            port = port._replace(example=port.example._replace(others=(VehiclePose(),) * len(bodies)))
         outputs.append(port)
-    inputs = (*config.inputs, *(InputPort(neighbour_port(other, ports.TRUTH)) for other in bodies))
-    return ServiceConfig(setup._replace(instruments=tuple(instruments)), inputs, tuple(outputs))
+    inputs = (*settings.inputs, *(InputPort(neighbour_port(other, ports.TRUTH)) for other in bodies))
+    return ServiceConfig(config._replace(instruments=tuple(instruments)), inputs, tuple(outputs))
 
 
 def _sees_vehicles(module: ModuleType) -> bool:
     return bool(getattr(module, "SEES_VEHICLES", False))
 
 
-def reseed(config: ServiceConfig, seed: int, vehicle: str) -> ServiceConfig:
+def reseed(settings: ServiceConfig, seed: int, vehicle: str) -> ServiceConfig:
     """Return the instruments with another seed."""
-    setup: SensorsSetup = config.parameters
+    config: SensorsConfig = settings.parameters
     instruments = tuple(
         instrument._replace(key=stream_key(seed, vehicle, port.name))
-        for instrument, port in zip(setup.instruments, config.ports, strict=True)
+        for instrument, port in zip(config.instruments, settings.ports, strict=True)
     )
-    return config._replace(parameters=setup._replace(instruments=instruments))
+    return settings._replace(parameters=config._replace(instruments=instruments))
 
 
 def _reading(name: str, table: Mapping[str, Any], p: Any) -> Any:

@@ -20,7 +20,7 @@ class Damage(NamedTuple):
     """Lost part of a blade, from the scene's `effects.rotor_damage`."""
 
     rotor: int  # from 0
-    start: int  # [tick]
+    start: int  # [tick] of the damage
     lost: float  # fraction of the thrust
 
 

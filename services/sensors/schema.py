@@ -4,8 +4,8 @@ from typing import Any, ClassVar
 
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.services.common.communication_schema import Communication, ticks
-from lapwing.services.common.named_tables import NamedTables
+from lapwing.services.common.schemas.communication_schema import Communication, ticks
+from lapwing.services.common.schemas.named_tables import NamedTables
 from lapwing.services.sensors.registry import parameters
 
 

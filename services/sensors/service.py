@@ -16,7 +16,7 @@ from lapwing.services.sensors.encoders import PORTS, GpsEncoding, SonarEncoding,
 NAME = "sensors"
 
 
-class SensorsSetup(NamedTuple):
+class SensorsConfig(NamedTuple):
     """Resolved configuration of the service."""
 
     instruments: tuple[Instrument, ...]  # in the order of their ports
@@ -24,26 +24,28 @@ class SensorsSetup(NamedTuple):
     gps: GpsEncoding
 
 
-def create(setup: RunConfig) -> Service:
+def create(config: RunConfig) -> Service:
     """Return the sensors of a run."""
-    config = setup.services[NAME]
-    s: SensorsSetup = config.parameters
+    settings = config.services[NAME]
+    s: SensorsConfig = settings.parameters
     parts = [
-        Block(f"{NAME}.{port.name}", p, Cell(_blank(p)), config.inputs[: 1 + len(p.others)], (port,), port.period)
-        for p, port in zip(s.instruments, config.ports, strict=True)
+        Block(f"{NAME}.{port.name}", p, Cell(_blank(p)), settings.inputs[: 1 + len(p.others)], (port,), port.period)
+        for p, port in zip(s.instruments, settings.ports, strict=True)
     ]
-    return Service(NAME, parts, _module_encoders(setup, s) + topic_encoders(setup, s.sonar, s.gps))
+    return Service(NAME, parts, _module_encoders(config, s) + topic_encoders(config, s.sonar, s.gps))
 
 
-def _module_encoders(setup: RunConfig, s: SensorsSetup) -> list[TopicEncoder]:
+def _module_encoders(config: RunConfig, s: SensorsConfig) -> list[TopicEncoder]:
     """Return the encoders of sensors whose modules provide them, and of custom sensors."""
     result: list[TopicEncoder] = []
-    for p, port in zip(s.instruments, setup.services[NAME].ports, strict=True):
+    for p, port in zip(s.instruments, config.services[NAME].ports, strict=True):
         module = sys.modules[type(p.sensor).__module__]
         if port.name in PORTS:
             continue
         built_in = module.__package__ == __package__ and port.name not in ports.IMUS
-        result += module.topic_encoders(setup.vehicle, port, p) if built_in else [reading_encoder(setup.vehicle, port)]
+        result += (
+            module.topic_encoders(config.vehicle, port, p) if built_in else [reading_encoder(config.vehicle, port)]
+        )
     return result
 
 

@@ -39,12 +39,12 @@ class Sonar(NamedTuple):
 
     noise_m_per_sqrt_hz: Annotated[float, Ge(0)] = 0.0  # [m/sqrt(Hz)] one-sided density
     scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio, one standard deviation: speed of sound
-    range_min: Annotated[float, Ge(0)] = 0.0  # [m]
-    range_max: Annotated[float, Gt(0)] = math.inf  # [m]
-    resolution: Annotated[float, Ge(0)] = 0.0  # [m]
+    range_min: Annotated[float, Ge(0)] = 0.0  # [m] smallest measurable distance
+    range_max: Annotated[float, Gt(0)] = math.inf  # [m] largest measurable distance
+    resolution: Annotated[float, Ge(0)] = 0.0  # [m] step of a reading
     half_beam_deg: Annotated[float, Ge(0), Lt(90)] = 0.0  # [deg] the nearest ground within the beam returns the echo
     tilt_max_deg: Annotated[float, Gt(0), Lt(90)] = 89.0  # [deg] maximum tilt with an echo
-    rate: Annotated[float, Gt(0)] = 10.0  # [Hz]
+    rate: Annotated[float, Gt(0)] = 10.0  # [Hz] readings a second
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
     echo: Echo | None = None  # soft ground and noise of the propellers; default: none
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule

@@ -26,9 +26,9 @@ class Gyro(NamedTuple):
     turn_on_bias_dps: Annotated[float, Ge(0)] = 0.0  # [deg/s] bias that differs from one start to the next
     temperature_dps_per_k: Annotated[float, Ge(0)] = 0.0  # [deg/s/K] residual after calibration
     scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio
-    misalignment_deg: Annotated[float, Ge(0), Lt(45)] = 0.0  # [deg]
-    range_dps: Annotated[float, Gt(0)] = math.inf  # [deg/s]
-    resolution_dps: Annotated[float, Ge(0)] = 0.0  # [deg/s]
+    misalignment_deg: Annotated[float, Ge(0), Lt(45)] = 0.0  # [deg] standard deviation of an axis's direction
+    range_dps: Annotated[float, Gt(0)] = math.inf  # [deg/s] largest measurable rate
+    resolution_dps: Annotated[float, Ge(0)] = 0.0  # [deg/s] step of a reading
 
 
 class Accelerometer(NamedTuple):
@@ -40,9 +40,9 @@ class Accelerometer(NamedTuple):
     turn_on_bias_mg: Annotated[float, Ge(0)] = 0.0  # [mg] bias that differs from one start to the next
     temperature_mg_per_k: Annotated[float, Ge(0)] = 0.0  # [mg/K] residual after calibration
     scale_error: Annotated[float, Ge(0), Lt(1)] = 0.0  # ratio
-    misalignment_deg: Annotated[float, Ge(0), Lt(45)] = 0.0  # [deg]
-    range_g: Annotated[float, Gt(0)] = math.inf  # [g]
-    resolution_mg: Annotated[float, Ge(0)] = 0.0  # [mg]
+    misalignment_deg: Annotated[float, Ge(0), Lt(45)] = 0.0  # [deg] standard deviation of an axis's direction
+    range_g: Annotated[float, Gt(0)] = math.inf  # [g] largest measurable specific force
+    resolution_mg: Annotated[float, Ge(0)] = 0.0  # [mg] step of a reading
 
 
 Coupling = Annotated[float, Ge(-10), Le(10)]

@@ -49,6 +49,7 @@ def step(p: FollowedPath, s: Any, tick: int, inputs: tuple[InputSample, ...]) ->
     offset = polynomial_piece.evaluate(p.relative.path, t, p.relative.final)
     heading = polynomial_piece.channel_at(p.leader.path.yaw, t) if p.heading else (0.0, 0.0, 0.0)
     position, velocity, acceleration = rotate_setpoint(heading, offset)
+    lands = leader.landing_speed >= 0.0 and offset.landing_speed >= 0.0
     return (
         s,
         (
@@ -61,6 +62,7 @@ def step(p: FollowedPath, s: Any, tick: int, inputs: tuple[InputSample, ...]) ->
                 offset.phase,
                 offset.final and leader.final,
                 offset.release,
+                leader.landing_speed + offset.landing_speed if lands else -1.0,
             ),
         ),
         CONTINUE,

@@ -42,6 +42,7 @@ class Parameters(NamedTuple):
     yaw: Channel
     phase_start: np.ndarray  # (phases,) [s]
     phase_release: np.ndarray  # (phases,) 1 if the payload is released
+    phase_landing_speed: np.ndarray  # (phases,) see `Setpoint`
     origin_world: Vec3  # [m]
     origin_yaw: float  # [rad]
 
@@ -99,4 +100,5 @@ def evaluate(p: Parameters, t: float, final: int) -> Setpoint:
         phase,
         phase >= final,
         p.phase_release[phase] > 0.0,
+        p.phase_landing_speed[phase],
     )

@@ -10,15 +10,15 @@ from lapwing.cosim.scene import Scene
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vector import subtract
 from lapwing.services.common import ports
-from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.ports import Setpoint
-from lapwing.services.common.run_schema import follows_trajectory
-from lapwing.services.common.vehicle_schema import start_place
+from lapwing.services.common.schemas.communication_schema import Communication
+from lapwing.services.common.schemas.run_schema import follows_trajectory
+from lapwing.services.common.schemas.vehicle_schema import start_place
 from lapwing.services.trajectory.block import TrajectoryPath
 from lapwing.services.trajectory.leader_follower import FollowedPath
 from lapwing.services.trajectory.polynomial_piece import Parameters
 from lapwing.services.trajectory.schema import Trajectory, compile_trajectory
-from lapwing.services.trajectory.service import TrajectorySetup
+from lapwing.services.trajectory.service import TrajectoryConfig
 
 LEAD = 0.2  # [s] maximum lead of the references over the plant
 
@@ -33,7 +33,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     core = TrajectoryPath(path, result.final, exchange.interval)
     lead_ticks = max(1, round(LEAD * exchange.rate))
     return ServiceConfig(
-        TrajectorySetup(core, result.phases, *_leader(trajectory)),
+        TrajectoryConfig(core, result.phases, *_leader(trajectory)),
         (InputPort(ports.TRUTH, lead_ticks),),
         (Port(ports.TRAJECTORY, Setpoint()),),
     )

@@ -10,31 +10,55 @@ name = "hover"
 duration = 5.0
 ```
 
-Values are displacements from the vehicle's initial pose in world axes; z = 0 is the ground. With `leader` they are
-displacements relative to the leader's trajectory. Channels without a segment hold. A channel may have a list of
-consecutive segments. A segment with the key `module` is of a class in that user module. A phase lasts `duration`, by
-default as long as its longest channel; shorter channels hold.
+Instead of phases, a scene may list points, of which `waypoints.phases` makes phases:
+
+```toml
+[trajectory]
+waypoints = [
+  [0.0, 0.0, 5.0],
+  { x = 20.0, y = 0.0, z = 5.0, yaw_deg = 90.0 },
+  { latitude_deg = 40.7687, longitude_deg = 14.7909, z = 8.0 },
+]
+speed = 3.0
+turn = "round"
+```
+
+Values are displacements from the vehicle's initial pose in world axes; z = 0 is the ground; a trajectory that ends at
+the height of an obstacle below it lands there. With `leader` they are displacements relative to the leader's
+trajectory. Channels without a segment hold. A channel may have a list of consecutive segments. A segment with the key
+`module` is of a class in that user module. A phase lasts `duration`, by default as long as its longest channel; shorter
+channels hold.
 """
 
 import csv
 import math
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, ClassVar, Literal
+
+from pydantic import model_validator
 
 from lapwing.cosim.scene import Files, KeyOrigin, Scene, SceneError, SceneTable
 from lapwing.cosim.scene.files import unvalidated_value
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.geodesy import Home
+from lapwing.dynamics.terrain import Level, surface
+from lapwing.dynamics.validation import validated
 from lapwing.services.common import user_modules
-from lapwing.services.trajectory import user_segment
+from lapwing.services.common.schemas.environment_schema import EnvironmentTable, environment
+from lapwing.services.common.schemas.vehicle_schema import Vehicle, start_place
+from lapwing.services.trajectory import user_segment, waypoints
 from lapwing.services.trajectory.phases import Phases
 from lapwing.services.trajectory.segments.segment import Segment
 from lapwing.services.trajectory.trajectory_compiler import CHANNELS, CompiledTrajectory, compile
+from lapwing.services.trajectory.waypoints import Route, Waypoint
 
+ROUTE = set(Route.model_fields)
 TABLE_HEADER = ["time", "value"]
 
 
-class Trajectory(Phases, SceneTable):
+class Trajectory(Route, Phases, SceneTable):
     """The trajectory to fly."""
 
     TABLE: ClassVar[str] = "trajectory"
@@ -42,9 +66,33 @@ class Trajectory(Phases, SceneTable):
     leader: str | None = None  # name of the vehicle relative to whose trajectory the phases are defined
     frame: Literal["heading", "world"] | None = None  # axes of the phases: the leader's heading [heading], or world
 
+    @model_validator(mode="before")
+    @classmethod
+    def _from_waypoints(cls, table: Any) -> Any:
+        """Add the phases of the waypoints, which are validated first."""
+        if not isinstance(table, dict) or not (given := {key: table[key] for key in ROUTE if key in table}):
+            return table
+        if "waypoints" not in given:
+            raise ConfigError(next(iter(given)), "applies to waypoints only", "waypoints, or rates of the segments")
+        if "phase" in table:
+            raise ConfigError("waypoints", "got waypoints and phases", "one of the two")
+        route = validated(Route.model_validate, given, Route)
+        return {**table, "phase": waypoints.phases(route)}
+
+    def resolved(self) -> dict[str, Any]:
+        """Return the waypoints or the phases, whichever the scene has, and the other keys."""
+        return self.model_dump(exclude_none=True, exclude={"phase"} if self.waypoints else ROUTE)
+
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
-        """Store the modules of user segments, and read the CSV file of a segment of kind "table" into its points."""
+        """Convert waypoint tables to lists, store user modules, read the CSV files of segments of kind "table"."""
+        points = unvalidated_value(tree, cls.TABLE, "waypoints")
+        for i, point in enumerate(points if isinstance(points, list) else ()):
+            key = f"{cls.TABLE}.waypoints.{i}"
+            if isinstance(point, dict):
+                points[i] = _place(tree, key, point)
+            elif isinstance(point, list) and len(point) not in (3, 4):
+                raise ConfigError(key, f"got {point}", "x, y, z [m], and optionally the yaw [rad]")
         phases = unvalidated_value(tree, cls.TABLE, "phase")
         for i, phase in enumerate(phases if isinstance(phases, list) else ()):
             for channel in CHANNELS if isinstance(phase, dict) else ():
@@ -67,6 +115,17 @@ class Trajectory(Phases, SceneTable):
             raise ConfigError("trajectory.frame", "has no leader", "trajectory.leader, or no frame")
 
 
+def _place(tree: dict[str, Any], key: str, point: dict[str, Any]) -> list[float]:
+    """Return a waypoint in metres. Raise ConfigError with its key in the scene."""
+    home, start = Home(), unvalidated_value(tree, Vehicle.TABLE, "initial_position") or (0.0, 0.0)
+    with suppress(TypeError):  # an invalid home, or start, is reported with its key when its table is validated
+        home = Home(**unvalidated_value(tree, EnvironmentTable.TABLE, "home") or {})
+    try:
+        return validated(Waypoint.model_validate, point, Waypoint).point(home, start)
+    except ConfigError as error:
+        raise error.with_prefix(key) from None
+
+
 def compile_trajectory(scene: Scene) -> CompiledTrajectory:
     """Return the scene's trajectory about the origin. See `compile` for errors."""
     return scene.cached(_compile)
@@ -75,7 +134,17 @@ def compile_trajectory(scene: Scene) -> CompiledTrajectory:
 def _compile(scene: Scene) -> CompiledTrajectory:
     trajectory = scene[Trajectory]
     user_segment.load(scene, _keyed_segments(trajectory))
-    return compile(trajectory)
+    return compile(trajectory, ground=_ground(scene))
+
+
+def _ground(scene: Scene) -> Callable[[float, float], float]:
+    """Return the height [m] of the ground, or of an obstacle, over that at the start, at a displacement x, y [m]."""
+    terrain = environment(scene).terrain
+    if isinstance(terrain, Level) or scene[Trajectory].leader:
+        return lambda x, y: 0.0
+    x0, y0, _ = start_place(scene)
+    start = surface(terrain, x0, y0)[0]
+    return lambda x, y: float(surface(terrain, x0 + x, y0 + y)[0] - start)
 
 
 def _keyed_segments(trajectory: Trajectory) -> Iterator[tuple[str, Segment]]:

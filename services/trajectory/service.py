@@ -15,7 +15,7 @@ from lapwing.services.trajectory.leader_follower import FollowedPath
 NAME = "trajectory"
 
 
-class TrajectorySetup(NamedTuple):
+class TrajectoryConfig(NamedTuple):
     """Resolved configuration of the service."""
 
     core: TrajectoryPath | FollowedPath
@@ -24,8 +24,8 @@ class TrajectorySetup(NamedTuple):
     heading: bool = False  # displacements are in axes along the leader's heading
 
 
-def create(setup: RunConfig) -> Service:
+def create(config: RunConfig) -> Service:
     """Return the trajectory service of a run."""
-    config: Any = setup.services[NAME]
-    part = Block(NAME, config.parameters.core, Cell(0.0), config.inputs, config.ports)
-    return Service(NAME, [part], [setpoint_encoder(TRAJECTORY, ports.TRAJECTORY, config.parameters.phases)])
+    settings: Any = config.services[NAME]
+    part = Block(NAME, settings.parameters.core, Cell(0.0), settings.inputs, settings.ports)
+    return Service(NAME, [part], [setpoint_encoder(TRAJECTORY, ports.TRAJECTORY, settings.parameters.phases)])

@@ -5,9 +5,8 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-import benchmarks.other_simulators
-from benchmarks.other_simulators import stability
-from benchmarks.other_simulators.stability import _ball_feet
+from benchmarks import _simulators, stability
+from benchmarks._simulators import _cases
 from lapwing.dynamics import discovery
 from lapwing.dynamics.lie.quaternion import Quaternion, rotation_matrix
 from lapwing.studies.stability import cases
@@ -17,9 +16,9 @@ from lapwing.studies.stability.cases import toppling
 def test_errors_of_installed_simulators_are_printed(monkeypatch, capsys):
     simulator = SimpleNamespace(CASES={"exact_time": lambda: {row: {"Made-up RK4": 0.25}}})
     row = cases.get("exact_time").run().rows[0].name
-    monkeypatch.setattr(stability, "installed", lambda package: [simulator])
+    monkeypatch.setattr(_simulators, "installed", lambda: [simulator])
     assert stability.errors("exact_time") == {row: {"Made-up RK4": 0.25}}
-    benchmarks.other_simulators.main(("exact_time",))
+    stability.main(["exact_time"])
     assert "Made-up RK4" in capsys.readouterr().out
 
 
@@ -27,7 +26,7 @@ def test_simulators_that_are_not_installed_are_skipped(monkeypatch, capsys):
     def missing(package, name, what):
         raise ImportError(name)
 
-    monkeypatch.setattr(benchmarks.other_simulators.discovery, "get", missing)
+    monkeypatch.setattr(_simulators.discovery, "get", missing)
     assert stability.errors("looping") == {}
     assert "mujoco_sim: skipped" in capsys.readouterr().out
 
@@ -37,7 +36,7 @@ def test_simulators_that_are_not_installed_are_skipped(monkeypatch, capsys):
 )
 def test_simulators_measure_rows_of_cases(name, package):
     pytest.importorskip(package)
-    simulator = discovery.get(stability, name, "simulator")
+    simulator = discovery.get(_simulators, name, "simulator")
     assert set(simulator.CASES) <= set(cases.names())
     loops = simulator.CASES["looping"]()["momentum"]
     assert loops
@@ -46,25 +45,25 @@ def test_simulators_measure_rows_of_cases(name, package):
 
 def test_drake_four_bars_follow_equation_of_motion():
     pytest.importorskip("pydrake")
-    simulator = discovery.get(stability, "drake_sim", "simulator")
+    simulator = discovery.get(_simulators, "drake_sim", "simulator")
     assert simulator.four_bars()["four_bar"][simulator.DISCRETE] < 0.05  # [m], of tips that move by 2 m
 
 
 @pytest.mark.parametrize("axis", toppling.AXES)
 @pytest.mark.parametrize("angle", [0.0, 0.4])
 def test_set_down_vehicle_touches_with_two_balls(axis, angle):
-    height, attitude = _ball_feet.set_down(axis, angle)
+    height, attitude = _cases.set_down(axis, angle)
     R = np.reshape(rotation_matrix(Quaternion(*attitude)), (3, 3))
-    lowest = sorted(height + R[2] @ ball for ball in _ball_feet.BALLS)
-    assert lowest[:2] == pytest.approx([_ball_feet.RADIUS] * 2, abs=1e-12)
+    lowest = sorted(height + R[2] @ ball for ball in _cases.BALLS)
+    assert lowest[:2] == pytest.approx([_cases.RADIUS] * 2, abs=1e-12)
 
 
 @pytest.mark.parametrize("off", [0.0, 1e-3])
 def test_toppling_edge_is_below_centre_of_mass(off):
     def falls(axis, angle):
-        _, attitude = _ball_feet.set_down(axis, angle - off)
+        _, attitude = _cases.set_down(axis, angle - off)
         R = np.reshape(rotation_matrix(Quaternion(*attitude)), (3, 3))
-        lowest = min(_ball_feet.BALLS, key=lambda ball: R[2] @ ball)
+        lowest = min(_cases.BALLS, key=lambda ball: R[2] @ ball)
         return (R @ lowest)[1 - axis] * lowest[1 - axis] < 0.0  # on the other side of the centre of mass
 
-    assert _ball_feet.error(falls) == pytest.approx(off, abs=1e-10)
+    assert _cases.toppling_error(falls) == pytest.approx(off, abs=1e-10)

@@ -36,7 +36,6 @@ EXEMPT = {
     "services/betaflight/state_source.py": "real time",
     "services/autopilot/margins.py": "stability margins: gain design, and a warning before the flight",
     "services/common/mavlink": "beside the lock step",
-    "services/common/gltf_file.py": "meshes of the 3D view",
     "services/mavlink": "beside the lock step",
 }
 ROUNDED_BY_LIBRARY = {

@@ -27,7 +27,7 @@ def imports():
     return result
 
 
-def cycle(graph):
+def cycle(diagram):
     """Return the names along an import cycle, or None."""
     done = set()
 
@@ -36,13 +36,13 @@ def cycle(graph):
             return [*way[way.index(name) :], name]
         if name in done:
             return None
-        for other in sorted(graph[name]):
+        for other in sorted(diagram[name]):
             if result := search(other, [*way, name]):
                 return result
         done.add(name)
         return None
 
-    return next((result for name in sorted(graph) if (result := search(name, []))), None)
+    return next((result for name in sorted(diagram) if (result := search(name, []))), None)
 
 
 def test_cycle_is_found():
@@ -50,6 +50,6 @@ def test_cycle_is_found():
 
 
 def test_project_has_no_import_cycle():
-    graph = imports()
-    assert len(graph) > 400
-    assert cycle(graph) is None
+    diagram = imports()
+    assert len(diagram) > 400
+    assert cycle(diagram) is None

@@ -27,7 +27,7 @@ COMMANDS = {  # run here, in this order, in one folder
     "certificates": "certificates keys --days 2",
     "verify": "verify a.mcap --explain",
     "recover": "recover cut.mcap --out b.mcap",
-    "export": "export a.mcap --csv csv --parquet parquet --mat a.mat --topics /clock,/drone1/pose",
+    "export": "export a.mcap --csv csv --parquet parquet --mat a.mat --ulog a.ulg --topics /clock,/drone1/pose",
     "resimulate": "resimulate a.mcap --allow-code",
     "report": "report a.mcap --out b.png --vehicle drone1",
     "comparison": "report a.mcap r.mcap --out both.html --names first,second",
@@ -39,7 +39,7 @@ COMMANDS = {  # run here, in this order, in one folder
     "new vehicle": "new vehicle my_quad --set mass=2.0",
     "diagram": "protocol hover --plot protocol.svg",
     "accuracy": f"accuracy {GYROSTAT} --set run.duration=5 --target 1e-3 --json accuracy.json --plot accuracy.png",
-    "effects": "effects hover --set run.duration=0.2 --tolerance 0.02 --only gravity,air_density --json effects.json"
+    "effects": "effects hover --set run.duration=0.2 --tolerance 0.02 --only air_density,collision --json effects.json"
     " --plot effects.svg",
     "stability sweep": "stability edges --sweep",
     "excitation": "run excitation --mode single-process --log excitation.mcap",
@@ -48,7 +48,7 @@ COMMANDS = {  # run here, in this order, in one folder
 }
 IDENTIFY = "tests/studies/identification/test_output_error.py::test_command_writes_airframe_with_provenance"
 SENSOR_FIT = "tests/studies/identification/test_sensor_fit.py::test_command_writes_tables_that_scene_takes"
-IMPORT = "tests/studies/flight_import/test_import.py::test_command_writes_log_that_other_commands_read"
+IMPORT = "tests/flights/log_import/test_import.py::test_command_writes_log_that_other_commands_read"
 SEPARATE = "tests/services/mavlink/test_separate_link.py"
 ELSEWHERE = {  # other tests by option; a test's file contains the option
     "identify": {
@@ -72,10 +72,14 @@ ELSEWHERE = {  # other tests by option; a test's file contains the option
     "import": {
         "--mapping": IMPORT,
         "--out": IMPORT,
-        "--vehicle": "tests/studies/flight_import/test_rosbag.py::test_command_selects_vehicle_of_bag",
+        "--vehicle": "tests/flights/log_import/test_rosbag.py::test_command_selects_vehicle_of_bag",
+        "--instance": "tests/flights/log_import/test_log_doubts.py::test_command_ends_with_table_and_takes_instance",
+        "--twist-frame": "tests/flights/log_import/test_bag_frames.py::test_twist_that_contradicts_position",
     },
     "run": {
-        "--allow-code": "tests/services/fmu/test_import.py",
+        "--firmware-schedule": "tests/services/ardupilot/test_flights.py",
+        "--allow-code": "tests/fmi/importer/test_import.py",
+        "--force": "tests/studies/tune/test_procedure.py::test_force_flies_unstable_gains",
         "--plan": "tests/lapwing/test_environment_faults.py::test_broken_plan_is_rejected",
         "--key-prefix": "tests/lapwing/test_output_lock.py::test_run_rejects_log_that_is_being_written",
         "--foxglove": "tests/services/foxglove/test_foxglove.py",
@@ -105,11 +109,13 @@ ELSEWHERE = {  # other tests by option; a test's file contains the option
         "--ros2": "tests/services/ros2/test_service.py",
         "--ros2-router": "tests/services/ros2/test_service.py",
     },
-    "autopilot": dict.fromkeys(("--px4-sim", "--set", "--log"), "tests/services/px4/test_simulator.py"),
-    "check": {"--allow-code": "tests/services/fmu/test_import.py"},
+    "effects": {"--list": "tests/lapwing/test_descriptions.py::test_list_has_every_effect_and_key"},
+    "test": dict.fromkeys(("--junit", "--keep"), "tests/lapwing/test_scene_tests.py"),
+    "check": {"--allow-code": "tests/fmi/importer/test_import.py"},
     "campaign": {
         "--cluster": "tests/studies/campaign/test_cluster.py",
-        "--allow-code": "tests/services/fmu/test_effect_inputs.py",
+        "--explain": "tests/studies/campaign/test_campaign.py::test_failed_run_shrinks_to_least_change",
+        "--allow-code": "tests/fmi/importer/test_effect_inputs.py",
     },
     "replay": {
         **dict.fromkeys(("--speed", "--from", "--to", "--loop", "--topics", "--listen"), "tests/cosim/test_replay.py"),
@@ -133,7 +139,7 @@ ELSEWHERE = {  # other tests by option; a test's file contains the option
         **dict.fromkeys(("--out", "--part", "--cpu", "--set"), "tests/fmi/test_library.py"),
         "--allow-code": "tests/fmi/test_export_with_fmus.py",
     },
-    "studio": {"--port": "tests/studio/test_studio.py::test_port_in_use_is_rejected_in_one_line"},
+    "studio": {"--port": "tests/views/studio/test_studio.py::test_port_in_use_is_rejected_in_one_line"},
     "view": {"--rerun": "tests/lapwing/test_view.py"},
     "render": dict.fromkeys(
         ("--camera", "--fps", "--from", "--out", "--size", "--speed", "--to", "--with"), "tests/lapwing/test_render.py"

@@ -22,7 +22,7 @@ from lapwing.services.process_main import read_spec
 given = read_spec()
 import lapwing.cosim.transport.bus, lapwing.cosim.executors.lockstep
 from lapwing.services import process_table
-process_table.create(given.setup, given.name)
+process_table.create(given.config, given.name)
 print(*sorted(set(sys.modules) - before))
 """
 
@@ -41,14 +41,14 @@ main()
 
 
 @pytest.fixture(scope="module")
-def setup():
+def config():
     return resolve(load("delivery_mission"))
 
 
 @pytest.mark.parametrize("name", ["plant", "sensors", "autopilot", "trajectory"])
-def test_process_imports_are_minimal(setup, name):
+def test_process_imports_are_minimal(config, name):
     values = BytesIO()
-    write_spec(ProcessSpec(name, setup, {}, "lapwing"), values)
+    write_spec(ProcessSpec(name, config, {}, "lapwing"), values)
     ended = subprocess.run(
         [sys.executable, "-P", "-c", CHILD], input=values.getvalue(), capture_output=True, check=True
     )

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from lapwing.cosim.log import LogReader
-from lapwing.services.common.run_schema import Published, Run
+from lapwing.services.common.schemas.run_schema import Published, Run
 from lapwing.services.scene_resolver import load
 
 pytestmark = pytest.mark.long

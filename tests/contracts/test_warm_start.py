@@ -10,7 +10,7 @@ pytestmark = pytest.mark.long
 
 RUN = """
 import json, sys
-from lapwing.cli.main import app
+from lapwing.cli.main import main
 from lapwing.kernels import on_compile
 from lapwing.kernels.compiler import cache_files
 compiled, looked_up, read = [], [], cache_files.read
@@ -20,7 +20,7 @@ def watched(folder, name, version):
     return read(folder, name, version)
 cache_files.read = watched
 on_compile(compiled.append)
-app(sys.argv[1:], standalone_mode=False)
+main()
 print(json.dumps([compiled, looked_up]))
 """
 
@@ -80,5 +80,5 @@ def test_joined_process_looks_up_no_kernel(tmp_path, scene):
     words = ["run", scene, "--set", "run.duration=0.5", "--set", "success.require=[]", "--log", tmp_path / "log.mcap"]
     subprocess.run([sys.executable, "-c", JOINS, tmp_path / "told", *words], check=True, capture_output=True)
     looked_up = [line.split(" ") for line in (tmp_path / "told").read_text().splitlines()]
-    assert any(kernel.startswith("kernels/lapwing.cosim.diagram.compiled_block/run-") for kernel, _ in looked_up)
+    assert any(kernel.startswith("kernels/lapwing.cosim.diagram.compiled_loop/run-") for kernel, _ in looked_up)
     assert [(kernel, process) for kernel, process in looked_up if process] == []

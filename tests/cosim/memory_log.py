@@ -8,22 +8,23 @@ import numpy as np
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.diagram.topic_encoder import RecordBatch
-from lapwing.cosim.executors.single_process import PAGE, run_single
+from lapwing.cosim.executors.single_process import KEPT_TICKS, run_single
 from lapwing.cosim.scene import Scene
+from lapwing.flights.flight_data import FlightData
+from lapwing.flights.flight_provenance import Origin
+from lapwing.flights.topic_view import TopicView
 from lapwing.messages.digest import Digest
 from lapwing.messages.topic_columns import history
 from lapwing.messages.topics import Topic
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import resolve
-from lapwing.studies.outcome import LANDED, classify
-from lapwing.studies.topic_view import TopicView
 
 
 class MemoryLog:
     """Recorded messages of a flight in memory, decoded on access, by topic name without the vehicle."""
 
-    def __init__(self, setup: RunConfig):
-        self.setup = setup
+    def __init__(self, config: RunConfig):
+        self.config = config
         self._pages: dict[str, list[RecordBatch]] = {}
         self._topics: dict[str, Topic] = {}
         self._decoded: dict[str, list[Any]] = {}
@@ -62,7 +63,7 @@ class MemoryLog:
 
     def times(self, name: str) -> np.ndarray:
         """Return the simulation times of a topic's messages [s], shape (n,)."""
-        return np.array([tick for tick, _ in self.payloads(name)]) * self.setup.interval_ns * 1e-9
+        return np.array([tick for tick, _ in self.payloads(name)]) * self.config.interval_ns * 1e-9
 
     def column(self, name: str, value: Callable[[Any], Any]) -> np.ndarray:
         """Return `value(message)` for each message of a topic, shape (n,) or (n, k)."""
@@ -71,12 +72,13 @@ class MemoryLog:
     @property
     def landed(self) -> bool:
         """True if the vehicle has landed."""
-        return classify(self.view("ground_truth"), self.view("status")).kind in LANDED
+        views = {name: self.view(name) for name in ("ground_truth", "status")}
+        return FlightData(views, Origin.of_config(self.config)).landed
 
     def view(self, name: str) -> TopicView:
         """Return a topic as columns."""
         ticks, payloads = zip(*self.payloads(name), strict=True)
-        return TopicView(np.array(ticks) * self.setup.interval_ns, history(self._topics[name].message, payloads))
+        return TopicView(np.array(ticks) * self.config.interval_ns, history(self._topics[name].message, payloads))
 
     @property
     def digest(self) -> str:
@@ -84,7 +86,7 @@ class MemoryLog:
         digest = Digest()
         for name, topic in self._topics.items():
             for tick, payload in self.payloads(name):
-                digest.update(topic.key(self.setup.vehicle), tick * self.setup.interval_ns, payload)
+                digest.update(topic.key(self.config.vehicle), tick * self.config.interval_ns, payload)
         return digest.hexdigest()
 
 
@@ -92,7 +94,7 @@ def fly(
     scene: Scene | RunConfig, operator: Callable[[int], Iterable[Any]] | None = None, last: int | None = None
 ) -> MemoryLog:
     """Fly a scene in this process, to the tick `last` or to its end; `operator` returns the commands until a tick."""
-    setup = scene if isinstance(scene, RunConfig) else resolve(scene)
-    log = MemoryLog(setup)
-    run_single(BlockDiagram(setup, create_all(setup, operator), PAGE), log, last=last)  # type: ignore[arg-type]
+    config = scene if isinstance(scene, RunConfig) else resolve(scene)
+    log = MemoryLog(config)
+    run_single(BlockDiagram(config, create_all(config, operator), KEPT_TICKS), log, last=last)  # type: ignore[arg-type]
     return log

@@ -15,24 +15,26 @@ class Alone:
     """Service in a separate diagram; inputs without a value are zero."""
 
     def __init__(self, scene: Scene, name: str):
-        self.setup = resolve(scene)
-        self.graph = BlockDiagram(self.setup, [create(self.setup, name)], KEPT_TICKS)
-        self._delays = {each.port: each.delay for each in self.setup.services[name].inputs}
+        self.config = resolve(scene)
+        self.diagram = BlockDiagram(self.config, [create(self.config, name)], KEPT_TICKS)
+        self._delays = {each.port: each.delay for each in self.config.services[name].inputs}
 
     def step(self, **given: Any) -> None:
         """Step the next tick; `given` has the values of its due inputs, by port."""
-        tick = self.graph.tick
+        tick = self.diagram.tick
         for port, value in given.items():
             if tick >= self._delays[port]:
-                self.graph.put(port, tick - self._delays[port], value)
-        self.graph.advance(tick + 1)
+                self.diagram.put(port, tick - self._delays[port], value)
+        self.diagram.advance(tick + 1)
 
     def value(self, port: str) -> Any:
         """Return the newest value of a port."""
-        return self.graph.latest(port, self.graph.tick - 1)
+        return self.diagram.latest(port, self.diagram.tick - 1)
 
     def message(self, topic: Topic) -> Any:
         """Return the message of a topic in the last tick, or None."""
-        tick = self.graph.tick - 1
-        result = [page.payloads[-1].tobytes() for page in self.graph.record_batches(tick, tick + 1, [topic], keep=True)]
+        tick = self.diagram.tick - 1
+        result = [
+            page.payloads[-1].tobytes() for page in self.diagram.record_batches(tick, tick + 1, [topic], keep=True)
+        ]
         return topic.message.decode(result[-1]) if result else None

@@ -56,27 +56,27 @@ def fly_together(name):
     return fly(*case(name))
 
 
-def fly_apart(setup, operator):
+def fly_apart(config, operator):
     """Run each service in a separate diagram; its records arrive in log packets of unequal length."""
-    services = create_all(setup, operator)
-    graphs = {service.name: BlockDiagram(setup, [service], 64) for service in services}
-    bundles = {name: StepPacketCodec(service.ports) for name, service in setup.services.items()}
-    log, handed = MemoryLog(setup), dict.fromkeys(graphs, 0)
+    services = create_all(config, operator)
+    graphs = {service.name: BlockDiagram(config, [service], 64) for service in services}
+    bundles = {name: StepPacketCodec(service.ports) for name, service in config.services.items()}
+    log, handed = MemoryLog(config), dict.fromkeys(graphs, 0)
     ended = False
     while not ended:
-        for name, graph in graphs.items():
-            tick = graph.tick
-            graph.advance(tick + 1)
+        for name, diagram in graphs.items():
+            tick = diagram.tick
+            diagram.advance(tick + 1)
             if bundles[name].due(tick):
-                payload = bundles[name].pack(graph, tick)
+                payload = bundles[name].pack(diagram, tick)
                 for other in graphs.values():
-                    if other is not graph:
+                    if other is not diagram:
                         bundles[name].unpack(payload, other, tick)
         ended = graphs[CLOCK_OWNER].ended
-        for i, (name, graph) in enumerate(graphs.items()):
-            if ended or graph.tick - handed[name] >= 11 + 6 * i:
-                pages = graph.record_batches(handed[name], graph.tick)
-                _, stop, pages = unpack_log_packet(pack_log_packet(pages, handed[name], graph.tick))
+        for i, (name, diagram) in enumerate(graphs.items()):
+            if ended or diagram.tick - handed[name] >= 11 + 6 * i:
+                pages = diagram.record_batches(handed[name], diagram.tick)
+                _, stop, pages = unpack_log_packet(pack_log_packet(pages, handed[name], diagram.tick))
                 log.write(pages, stop - 1)
                 handed[name] = stop
     return log

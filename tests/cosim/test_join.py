@@ -86,8 +86,8 @@ def test_participant_cannot_publish_for_others(tmp_path):
     """Access control drops the messages at both ends of a link, even with the publisher ids of others."""
     keys, run = tmp_path / "keys", PublisherIds("test-access")
     make(keys, ["plant", "sensors"], 1)
-    setup = resolve(load("delivery_mission"))
-    rules = by_certificate("test-access", publish_permissions(setup, "test-access"))
+    config = resolve(load("delivery_mission"))
+    rules = by_certificate("test-access", publish_permissions(config, "test-access"))
     (end,) = (each.replace("tcp/", "tls/") for each in loopback_endpoints(["plant"]).values())
     with (
         ZenohBus([end], gid=run.gid("plant"), security={**tls(keys, "plant"), **rules}) as plant,

@@ -48,7 +48,7 @@ def single(parts):
 def write_pages(path, pages):
     with LogWriter(path, {"seed": "7"}, {"scene.toml": b"a = 1\n"}) as log:
         for parts in pages:
-            log.write_page(parts)
+            log.write_batch(parts)
     return log.metadata["digest"]
 
 
@@ -92,10 +92,10 @@ def test_batches_and_messages_keep_call_order(tmp_path):
     values = OperatorInput(header(50 * TICK, "")).encode()
     with LogWriter(path, {}, {}) as log:
         log.write("/drone1/vehicle_command", OperatorInput, values, 0)
-        log.write_page(page(0))
+        log.write_batch(page(0))
         log.write("/drone1/vehicle_command", OperatorInput, values, 50 * TICK)
         log.write("/drone1/imu", Imu, Imu().encode(), 50 * TICK)
-        log.write_page(page(51))
+        log.write_batch(page(51))
     imu = [entry for entry in contents(path) if entry[0] == "/drone1/imu"]
     assert [(time, sequence) for _, _, time, sequence, _ in imu] == [(k * TICK, k) for k in range(101)]
     at = [k for k, entry in enumerate(contents(path)) if entry[0] == "/drone1/vehicle_command"]
@@ -152,7 +152,7 @@ def test_wall_time_messages_do_not_change_batch_chunks(tmp_path):
     def chunks(wall_times):
         with LogWriter(tmp_path / "log", {}, {}) as log:
             for k in range(4):
-                log.write_page(page(50 * k))
+                log.write_batch(page(50 * k))
                 if k in wall_times:
                     message = WallTime(header(0, ""), random.random())
                     log.write("/wall_time", WallTime, message.encode(), 50 * k * TICK, deterministic=False)
@@ -168,7 +168,7 @@ def test_arrays_may_be_reused_after_call(tmp_path):
     expected = write_pages(tmp_path / "a", pages)
     with LogWriter(tmp_path / "b", {"seed": "7"}, {"scene.toml": b"a = 1\n"}) as log:
         for parts in pages:
-            log.write_page(parts)
+            log.write_batch(parts)
             for _, _, times, payloads, order in parts:
                 times[:] = 0
                 payloads.view(np.uint8)[:] = 0
@@ -197,7 +197,7 @@ def test_empty_page_adds_no_chunk(tmp_path):
 def test_inconsistent_pages_are_rejected(tmp_path, change, words):
     part = [change.get(k, value) for k, value in enumerate(page(0)[0])]
     with LogWriter(tmp_path / "log", {}, {}) as log, pytest.raises(ValueError, match=words):
-        log.write_page([tuple(part)])
+        log.write_batch([tuple(part)])
 
 
 def test_negative_time_of_single_message_is_rejected(tmp_path):
@@ -230,8 +230,8 @@ def test_history_of_topic(tmp_path):
 def test_history_reads_only_chunks_of_its_topic(tmp_path):
     path = tmp_path / "log"
     with LogWriter(path, {}, {}) as log:
-        log.write_page([("/a", Vector3, np.zeros(50, int), Record.of(Vector3()).encode(50, {}), np.zeros(50, int))])
-        log.write_page(page(0))
+        log.write_batch([("/a", Vector3, np.zeros(50, int), Record.of(Vector3()).encode(50, {}), np.zeros(50, int))])
+        log.write_batch(page(0))
     data = bytearray(path.read_bytes())
     at = data.index(b"\x28\xb5\x2f\xfd")  # start of the first compressed chunk
     data[at + 12] ^= 0xFF

@@ -44,13 +44,13 @@ def test_arrays_changed_in_place_are_freed_with_owner(living):
     weights, ticks = np.linspace(-1.0, 2.0, 5), np.zeros(5)
     before, owners = (sys.getrefcount(weights), sys.getrefcount(ticks)), living()
     part = Block("mean", Mean(weights), Cell(Last(ticks, 0)), (), (SUM,))
-    graph = graph_of(part)
-    graph.advance(TICKS)
+    diagram = graph_of(part)
+    diagram.advance(TICKS)
     last = np.array([TICKS - 5 + (i - TICKS) % 5 for i in range(5)], float)
-    assert graph.latest("sum", TICKS - 1).number == pytest.approx(weights @ last)
+    assert diagram.latest("sum", TICKS - 1).number == pytest.approx(weights @ last)
     assert read(part.state).count == TICKS
     assert counts(Mean) == [False]
-    del part, graph
+    del part, diagram
     assert living() == owners
     assert (sys.getrefcount(weights), sys.getrefcount(ticks)) == before
 
@@ -58,8 +58,8 @@ def test_arrays_changed_in_place_are_freed_with_owner(living):
 def test_function_called_from_python_counts_references():
     """The code for blocks has the same name, but does not count references; it must not be used here."""
     p, s = Mean(np.linspace(-1.0, 2.0, 5)), Last(np.arange(5.0), 0)
-    graph = graph_of(Block("mean", p, Cell(s), (), (SUM,)))
-    graph.advance(TICKS)
+    diagram = graph_of(Block("mean", p, Cell(s), (), (SUM,)))
+    diagram.advance(TICKS)
     before = sys.getrefcount(s.ticks)
     for _ in range(10):
         total = weighted(p, s)[0]
@@ -71,15 +71,15 @@ def test_function_called_from_python_counts_references():
 def test_block_that_allocates_arrays_frees_them(living):
     owners = living()
     part = Block("squares", Squares(7), Cell(Last(np.zeros(7), 0)), (), (SUM,))
-    graph = graph_of(part)
-    graph.advance(10)
+    diagram = graph_of(part)
+    diagram.advance(10)
     allocated = living()
-    graph.advance(TICKS)
+    diagram.advance(TICKS)
     assert living() == allocated
-    assert graph.latest("sum", TICKS - 1).number == 91.0
+    assert diagram.latest("sum", TICKS - 1).number == 91.0
     assert read(part.state).ticks.tolist() == [0.0, 1.0, 4.0, 9.0, 16.0, 25.0, 36.0]
     assert counts(Squares) == [True]
-    del part, graph
+    del part, diagram
     assert living() == owners
 
 
@@ -87,11 +87,11 @@ def test_untrusted_block_may_replace_array(living):
     weights, ticks = np.linspace(-1.0, 2.0, 5), np.zeros(5)
     before, owners = (sys.getrefcount(weights), sys.getrefcount(ticks)), living()
     part = Block("exchange", Exchange(weights), Cell(Last(ticks, 0)), (), (SUM,), trusted=False)
-    graph = graph_of(part)
-    graph.advance(1)
-    assert graph.latest("sum", 0).number == 0.0
-    graph.advance(TICKS)
-    assert graph.latest("sum", TICKS - 1).number == -1.0
-    del part, graph
+    diagram = graph_of(part)
+    diagram.advance(1)
+    assert diagram.latest("sum", 0).number == 0.0
+    diagram.advance(TICKS)
+    assert diagram.latest("sum", TICKS - 1).number == -1.0
+    del part, diagram
     assert living() == owners
     assert (sys.getrefcount(weights), sys.getrefcount(ticks)) == before

@@ -16,7 +16,7 @@ from lapwing.cosim.access.publisher_ids import PublisherIds, new_secret
 from lapwing.cosim.config.serialise import to_json
 from lapwing.cosim.log import LogReader
 from lapwing.cosim.transport.bus import ZenohBus
-from lapwing.cosim.transport.bus_keys import ALIVE_KEY, BATCH_KEY, DIVERGED_KEY, ENDED_KEY, SETUP_KEY, STEP_KEY
+from lapwing.cosim.transport.bus_keys import ALIVE_KEY, BATCH_KEY, CONFIG_KEY, DIVERGED_KEY, ENDED_KEY, STEP_KEY
 from lapwing.cosim.transport.session_settings import mesh
 from lapwing.messages.attachment import pack
 from lapwing.services.common.operator_inbox import OPERATOR_KEY
@@ -54,10 +54,7 @@ def test_only_messages_of_expected_sender_are_received():
     with private_endpoints(["a", "b", "c"]) as ends, ZenohBus(*mesh("a", ends)) as bus:
         received = bus.receive(mine.senders(STEP_KEY, ["plant"]))
         first_comer = bus.receive({f"{PREFIX}/free": None})
-        with (
-            ZenohBus(*mesh("b", ends), gid=mine.gid("plant")) as plant,
-            ZenohBus([ends["c"]], [ends["a"]]) as stranger,
-        ):
+        with ZenohBus(*mesh("b", ends), gid=mine.gid("plant")) as plant, ZenohBus([ends["c"]], [ends["a"]]) as stranger:
             zenoh = stranger._session
             for bus_ in (plant, stranger):
                 bus_.declare_liveliness(f"{PREFIX}/{ALIVE_KEY}/{'plant' if bus_ is plant else 'stranger'}")
@@ -152,7 +149,7 @@ def test_unauthenticated_messages_do_not_change_flight(tmp_path):
 def test_external_service_with_other_configuration_is_rejected(tmp_path):
     other = to_json(resolve(load(SCENE, {"run.duration": 9.0}))).encode()
     with private_endpoints(["autopilot"]) as ends, ZenohBus([ends["autopilot"]]) as program:
-        program.answer(f"{PREFIX}/{SETUP_KEY}/autopilot", other)
+        program.answer(f"{PREFIX}/{CONFIG_KEY}/autopilot", other)
         run = fly(tmp_path, "--external", f"autopilot={ends['autopilot']}")
         program.declare_liveliness(f"{PREFIX}/{ALIVE_KEY}/autopilot")
         _, output = run.communicate(timeout=120)

@@ -1,9 +1,6 @@
-"""Files for two hosts and Kubernetes: valid, complete, with the privileges of containers on one host."""
+"""Files for two hosts: valid, complete, with the privileges of containers on one host."""
 
-import importlib.util
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -25,13 +22,6 @@ def composed(name):
     return yaml.safe_load(text)["services"]
 
 
-def manifests(scene):
-    spec = importlib.util.spec_from_file_location("kubernetes", ROOT / "deploy" / "kubernetes.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module.manifests(scene, "lapwing:latest")
-
-
 def peers_of(command):
     return parse_endpoints(command[command.index("--endpoints") + 1])
 
@@ -44,9 +34,9 @@ def test_two_hosts_share_endpoints_and_run_each_service_once():
     assert set(tables[0]) == {*plant, *others}
     assert not {*plant} & {*others}
     for scene in (ROOT / "lapwing/scenes").glob("*.toml"):
-        setup = resolve(load(scene))
-        if not process_table.foreign_firmware(setup):  # a foreign firmware runs on its own host
-            assert {MONITOR, *process_table.required_processes(setup)} <= set(tables[0])
+        config = resolve(load(scene))
+        if not process_table.foreign_firmware(config):  # a foreign firmware runs on its own host
+            assert {MONITOR, *process_table.required_processes(config)} <= set(tables[0])
 
 
 def test_service_of_two_hosts_has_certificate_of_its_name():
@@ -60,36 +50,3 @@ def test_service_of_two_hosts_has_certificate_of_its_name():
             assert (service["cap_drop"], service["security_opt"]) == (["ALL"], ["no-new-privileges:true"])
             port = peers_of(service["command"])[name].rpartition(":")[2]
             assert service["healthcheck"]["test"][-1] == f": < /dev/tcp/{address}/{port}"
-
-
-def test_kubernetes_names_unknown_scene():
-    command = [sys.executable, str(ROOT / "deploy" / "kubernetes.py"), "no_such_scene"]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
-    assert done.returncode == 2
-    (line,) = done.stderr.splitlines()
-    assert "no_such_scene" in line
-
-
-def test_kubernetes_accepts_manifests():
-    kubernetes = pytest.importorskip("kubernetes_validate", reason="kubernetes-validate is not installed")
-    for each in manifests("delivery_mission"):
-        kubernetes.validate(each, "1.32", strict=True)
-
-
-def test_kubernetes_has_pod_for_each_required_process():
-    needed = {MONITOR, *process_table.required_processes(resolve(load("cooperative_load")))}
-    result = {(each["kind"], each["metadata"]["name"]): each for each in manifests("cooperative_load")}
-    for name in needed:
-        spec = result["Pod", name]["spec"]
-        (container,) = spec["containers"]
-        table = peers_of(container["args"])
-        assert set(table) == needed
-        (port,) = result["Service", name]["spec"]["ports"]
-        assert table[name] == f"tls/{name}:{port['port']}"
-        selector, labels = result["Service", name]["spec"]["selector"], result["Pod", name]["metadata"]["labels"]
-        assert selector.items() <= labels.items()
-        for each in (container, *spec["initContainers"]):
-            assert each["securityContext"]["readOnlyRootFilesystem"]
-            assert not each["securityContext"]["allowPrivilegeEscalation"]
-            assert {mount["name"] for mount in each["volumeMounts"]} <= {volume["name"] for volume in spec["volumes"]}
-    assert {kind for kind, _ in result} == {"Namespace", "NetworkPolicy", "PersistentVolumeClaim", "Pod", "Service"}

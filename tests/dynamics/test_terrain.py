@@ -122,15 +122,9 @@ def test_empty_terrain_is_level_ground():
     [
         ({"slope": (0.8, 0.8)}, "slope: ground steeper than 45 degrees, tangent 1.13; expected a tangent of at most 1"),
         ({"bump_height": 1.0}, "bump_height: ground steeper than 45 degrees"),
-        (
-            {"grid": np.eye(5) * 3.0, "corner": (-2.0, -2.0)},
-            "grid.heights: ground steeper than 45 degrees",
-        ),
+        ({"grid": np.eye(5) * 3.0, "corner": (-2.0, -2.0)}, "grid.heights: ground steeper than 45 degrees"),
         ({"grid": np.zeros((5, 1))}, "grid.heights: expected at least 2 rows and 2 columns"),
-        (
-            {"grid": np.zeros((3, 3)), "corner": (1.0, 0.0)},
-            "grid.corner: the grid does not contain home: it",
-        ),
+        ({"grid": np.zeros((3, 3)), "corner": (1.0, 0.0)}, "grid.corner: the grid does not contain home: it"),
         ({"steps": [(2.0, 0.1), (1.0, 0.1)]}, "steps.distance: expected growing distances above 0 m, got [2.0, 1.0]"),
     ],
 )

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.combinations import rest_nightly
+
 NOTEBOOKS = sorted((Path(__file__).parents[2] / "examples/notebooks").glob("*.ipynb"))
 ALLOWED = {"lapwing", "lapwing.plugins", "math", "matplotlib.pyplot", "numpy", "plotly.graph_objects"}
 
@@ -32,7 +34,7 @@ def test_notebook_is_stripped_and_imports_public_names(path):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda path: path.stem)
+@pytest.mark.parametrize("path", rest_nightly(*NOTEBOOKS), ids=lambda path: path.stem)
 def test_notebook_runs_with_plots_and_3d_view(path, tmp_path):
     nbformat, nbclient = (
         pytest.importorskip(name, reason="needs lapwing[notebooks]") for name in ("nbformat", "nbclient")

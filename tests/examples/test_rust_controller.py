@@ -1,4 +1,4 @@
-"""Build and lock-step flight of the autopilot in Rust, if cargo is installed."""
+"""Build and lock-step flight of the autopilot in Rust, if cargo is installed. Nightly: it compiles 150 crates."""
 
 import json
 import os
@@ -9,11 +9,12 @@ from pathlib import Path
 
 import pytest
 
-from lapwing.flight import Flight
+from lapwing.api.flight import Flight
 from lapwing.runs.resimulate import resimulate
+from tests.combinations import NIGHTLY
 from tests.endpoints import loopback_endpoints
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, NIGHTLY]
 
 CRATE = Path("examples/rust_controller")
 SCENE = "examples/rust_mission.toml"

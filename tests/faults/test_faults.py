@@ -1,4 +1,4 @@
-"""Some runs with faults; `python -m tests.faults` runs any number of them."""
+"""Some runs with faults, most of them nightly; `python -m tests.faults` runs any number of them."""
 
 import os
 import subprocess
@@ -7,6 +7,7 @@ from pathlib import Path
 
 import pytest
 
+from tests.combinations import NIGHTLY
 from tests.faults import campaign, leak_checks, network_partition
 from tests.faults.trial import Trial, draw, fly
 from tests.hosts.network import why_not
@@ -27,7 +28,12 @@ FEW = {
 }
 
 
-@pytest.mark.parametrize("trial", FEW.values(), ids=FEW)
+EVERY_DAY = ("a service waits for a frozen one that goes on", "a worker of a campaign is killed")
+
+
+@pytest.mark.parametrize(
+    "trial", [pytest.param(trial, id=name, marks=() if name in EVERY_DAY else NIGHTLY) for name, trial in FEW.items()]
+)
 def test_fault_ends_run_as_specified(trial):
     if not Path("/proc/self/stat").exists():
         pytest.skip("finds processes in /proc")

@@ -2,10 +2,12 @@
 
 import pytest
 
+from tests.combinations import NIGHTLY
 from tests.faults import memory_pressure
 
 pytestmark = [
     pytest.mark.long,
+    NIGHTLY,
     pytest.mark.skipif(not memory_pressure.available(), reason="needs permission to create memory cgroups"),
 ]
 

@@ -2,10 +2,12 @@
 
 import pytest
 
+from tests.combinations import NIGHTLY
 from tests.faults.soak import Use, grown, soak
 
 
 @pytest.mark.long
+@NIGHTLY
 def test_flights_with_ground_station_leave_no_process_port_or_lock():
     flights = soak(["hover", "--set", "run.duration=3"], 600.0)
     first, second = next(flights), next(flights)

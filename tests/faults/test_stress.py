@@ -2,13 +2,14 @@
 
 import pytest
 
+from tests.combinations import NIGHTLY
 from tests.faults.stress import trial
 
-RUNS, AT_ONCE = 60, 6
 
-
+@pytest.mark.nightly
 @pytest.mark.long
-def test_simultaneous_runs_lose_no_message():
-    results = list(trial(RUNS, AT_ONCE, 0))
-    assert len(results) == RUNS
+@pytest.mark.parametrize("runs", [4, pytest.param(60, marks=NIGHTLY)])
+def test_simultaneous_runs_lose_no_message(runs):
+    results = list(trial(runs, min(runs, 6), 0))
+    assert len(results) == runs
     assert [result for result in results if result.wrong] == []

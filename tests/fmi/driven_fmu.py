@@ -12,8 +12,8 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.fmi3 import FMU3Slave
 from recorded_ports import RecordedPorts
 
-from lapwing.fmi.exported_part import ExportedPart
-from lapwing.fmi.variables import variables_of
+from lapwing.fmi.export.exported_part import ExportedPart
+from lapwing.fmi.export.variables import variables_of
 
 TYPES = {2: {"real": "Real", "integer": "Integer"}, 3: {"real": "Float64", "integer": "Int32"}}  # of the functions
 
@@ -53,8 +53,8 @@ class Slave:
     def prepare(self) -> None:
         """Enter initialisation mode."""
         if not self.is_3:
-            self.fmu.setupExperiment(startTime=0.0)
-        self.fmu.enterInitializationMode()
+            self.fmu.setupExperiment(startTime=self.time)
+        self.fmu.enterInitializationMode(**({"startTime": self.time} if self.is_3 else {}))
 
     def get(self, name: str) -> float:
         return self.values("real", [name])[0]
@@ -126,8 +126,8 @@ def assert_recorded_outputs(path: Path, exported: ExportedPart, recorded: Record
     for tick in range(recorded.ticks):
         if tick:
             set_inputs(tick)
-            a.time = (tick - 1) * recorded.setup.interval
-            a.step(recorded.setup.interval)
+            a.time = (tick - 1) * recorded.config.interval
+            a.step(recorded.config.interval)
         for kind, own in outputs.items():
             if own:
                 values = a.values(kind, [v.name for v in own])

@@ -19,23 +19,23 @@ def scene_config(name: str, **overrides: Any) -> RunConfig:
 class RecordedPorts:
     """A run with every sample of every port kept."""
 
-    def __init__(self, setup: RunConfig):
-        self.setup = setup
-        ports = {port.name for service in setup.services.values() for port in service.ports}
-        self.diagram = BlockDiagram(setup, create_all(setup), 1, whole=ports)
-        self.diagram.advance(setup.last_tick + 1)
+    def __init__(self, config: RunConfig):
+        self.config = config
+        ports = {port.name for service in config.services.values() for port in service.ports}
+        self.diagram = BlockDiagram(config, create_all(config), 1, whole=ports)
+        self.diagram.advance(config.last_tick + 1)
         self.ticks = self.diagram.tick
 
     def sample(self, port: str, tick: int) -> np.ndarray | None:
         """Return the row of a port at a tick, None if none is due."""
-        period = self.setup.port(port).period
+        period = self.config.port(port).period
         if tick < 0 or tick % period:
             return None
         return np.ascontiguousarray(self.diagram.row(port, tick))
 
     def latest(self, port: str, tick: int) -> np.ndarray:
         """Return the newest row of a port that is not after a tick; zeros before the first."""
-        period = self.setup.port(port).period
+        period = self.config.port(port).period
         row = self.diagram.row(port, max(tick, 0) - max(tick, 0) % period)
         return np.ascontiguousarray(row) if tick >= 0 else np.zeros_like(row)
 
@@ -46,22 +46,22 @@ class RecordedPorts:
 class DrivenService(RecordedPorts):
     """A service of a scene under random inputs, where the autopilot is a program that does not run here."""
 
-    def __init__(self, setup: RunConfig, name: str):
-        self.setup, rng = setup, random.Random(1)
-        service = create(setup, name)
+    def __init__(self, config: RunConfig, name: str):
+        self.config, rng = config, random.Random(1)
+        service = create(config, name)
         own = {port.name for part in service.parts for port in part.outputs}
         read = {i.port for part in service.parts for i in part.inputs} - own
-        self.diagram = BlockDiagram(setup, [service], 1, whole=own | read)
-        for tick in range(setup.last_tick + 1):
+        self.diagram = BlockDiagram(config, [service], 1, whole=own | read)
+        for tick in range(config.last_tick + 1):
             for port in sorted(read):
                 if tick % self.diagram.ports[port].period == 0:
-                    self.diagram.put(port, tick, _random(self.diagram.ports[port].like, rng))
+                    self.diagram.put(port, tick, _random(self.diagram.ports[port].example, rng))
             self.diagram.advance(tick + 1)
         self.ticks = self.diagram.tick
 
 
-def _random(like: Any, rng: random.Random) -> Any:
-    """Return a tree of the types of `like`: volts, and booleans that are true."""
-    if isinstance(like, tuple):
-        return tuple(_random(item, rng) for item in like)
-    return type(like)(rng.uniform(0.0, 8.0)) if not isinstance(like, bool) else True
+def _random(example: Any, rng: random.Random) -> Any:
+    """Return a tree of the types of `example`: volts, and booleans that are true."""
+    if isinstance(example, tuple):
+        return tuple(_random(item, rng) for item in example)
+    return type(example)(rng.uniform(0.0, 8.0)) if not isinstance(example, bool) else True

@@ -167,7 +167,7 @@ def test_plant_with_permission_is_exported(folder: Path, command: str) -> None:
 
 
 def test_fmus_that_package_cannot_have_are_named(tmp_path: Path) -> None:
-    write_event_fmu(tmp_path / "ball.fmu", kind="CoSimulation")
+    write_event_fmu(tmp_path / "ball.fmu")
     ball = '\n[services.ball]\nfmu = "ball.fmu"\n[services.ball.inputs]\n"u[0]" = "truth.velocity_world.2"\n'
     ball += '[services.ball.outputs]\n"trajectory.position_world.2" = "h"\n'
     scene = tmp_path / "ball.toml"

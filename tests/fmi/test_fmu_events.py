@@ -11,14 +11,15 @@ from recorded_ports import scene_config
 pytest.importorskip("fmpy")
 from driven_fmu import Slave
 
-from lapwing.fmi.fmu import export_fmu
+from lapwing.fmi.export.fmu import export_fmu
+from tests.combinations import rest_nightly
 
 pytestmark = pytest.mark.long
 HEIGHT, START = "truth.position_world[2]", "state.plant.vehicle.motion.position_world[2]"
 G, AT_REST, TICK = 9.80665, 0.35, 0.004
 
 
-@pytest.fixture(scope="module", params=[2, 3])
+@pytest.fixture(scope="module", params=rest_nightly(3, 2))
 def plant(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("fmu") / "plant.fmu"
     export_fmu(scene_config("hover", **{"run.duration": 2.0}), "plant", path, request.param)

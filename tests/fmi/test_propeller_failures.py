@@ -15,8 +15,9 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
 from lapwing.cosim.config.run_config import RunConfig
-from lapwing.fmi.exported_part import export_part
-from lapwing.fmi.fmu import export_fmu
+from lapwing.fmi.export.exported_part import export_part
+from lapwing.fmi.export.fmu import export_fmu
+from tests.combinations import NIGHTLY, rest_nightly
 
 pytestmark = pytest.mark.long
 LOCKED, FREE = '{time=2.601, propeller=2, failure="locked"}', '{time=2.602, propeller=1, failure="free"}'
@@ -28,7 +29,7 @@ TICK, FIRST, SECOND = 0.004, 2.604, 2.608  # [s]; ends of the ticks in which pro
 SPEED = "truth.rotor_speed"
 
 
-def setup_of(**overrides: object) -> RunConfig:
+def config_of(**overrides: object) -> RunConfig:
     return scene_config("delivery_mission", **{**SCENE, "multibody.event": FAILURES, **overrides})
 
 
@@ -65,29 +66,32 @@ def stepped(a: Slave, ticks: int) -> list[list[float]]:
 
 
 def assert_intact_before_failure(recorded: RecordedPorts) -> None:
-    intact = RecordedPorts(setup_of(**{"multibody.event": "[]"}))
+    intact = RecordedPorts(config_of(**{"multibody.event": "[]"}))
     equal = [np.array_equal(recorded.latest("truth", k), intact.latest("truth", k)) for k in range(recorded.ticks)]
     assert equal == [k * TICK < FIRST - TICK / 2 for k in range(recorded.ticks)]
 
 
+@pytest.mark.nightly
 def test_vehicle_has_recorded_outputs(vehicle: Path) -> None:
-    recorded = RecordedPorts(setup_of())
-    assert_recorded_outputs(vehicle, export_part(recorded.setup, "vehicle"), recorded)
+    recorded = RecordedPorts(config_of())
+    assert_recorded_outputs(vehicle, export_part(recorded.config, "vehicle"), recorded)
     assert_intact_before_failure(recorded)
 
 
+@NIGHTLY
 def test_plant_in_euler_angles_has_recorded_outputs(tmp_path: Path) -> None:
     """The step in Euler angles creates arrays, in memory of the runtime."""
-    recorded = RecordedPorts(setup_of(**ONE_FAILURE, **{"multibody.coordinates": "euler"}))
-    exported = export_fmu(recorded.setup, "plant", tmp_path / "part.fmu")
+    recorded = RecordedPorts(config_of(**ONE_FAILURE, **{"multibody.coordinates": "euler"}))
+    exported = export_fmu(recorded.config, "plant", tmp_path / "part.fmu")
     assert validate_fmu(str(tmp_path / "part.fmu")) == []
     assert_recorded_outputs(tmp_path / "part.fmu", exported, recorded)
 
 
+@NIGHTLY
 def test_fmi_2_has_recorded_outputs(tmp_path: Path) -> None:
-    recorded = RecordedPorts(setup_of(**ONE_FAILURE))
+    recorded = RecordedPorts(config_of(**ONE_FAILURE))
     path = tmp_path / "vehicle.fmu"
-    export_fmu(recorded.setup, "vehicle", path, 2)
+    export_fmu(recorded.config, "vehicle", path, 2)
     assert validate_fmu(str(path)) == []
     names = [f"{SPEED}[{k}]" for k in range(4)]
     result = simulate_fmu(str(path), output=names, stop_time=(recorded.ticks - 1) * TICK, output_interval=TICK)
@@ -97,13 +101,14 @@ def test_fmi_2_has_recorded_outputs(tmp_path: Path) -> None:
     assert np.array_equal(speeds, [recorded.latest("truth", k)[first : first + 4] for k in range(recorded.ticks)])
 
 
-@pytest.mark.parametrize("part", ["plant", "vehicle"])
+@pytest.mark.parametrize("part", rest_nightly("plant", "vehicle"))
 def test_library_has_recorded_outputs(part: str, tmp_path: Path) -> None:
     native, recorded = built(tmp_path, "delivery_mission", part, **SCENE, **{"multibody.event": FAILURES})
     native.compare(recorded, 0, recorded.ticks)
     assert native.call("missed")(native.instance) == 0
 
 
+@NIGHTLY
 def test_vehicle_of_fleet_fails_alone(tmp_path: Path) -> None:
     failing = {"vehicle.0.model": "multibody", "vehicle.0.multibody.event": ONE_FAILURE["multibody.event"]}
     native, recorded = built(tmp_path, "fleet", "plant", **failing, **{"run.duration": 2.8, "success.require": "[]"})
@@ -179,7 +184,7 @@ def test_saved_states_continue_before_and_after_failure(vehicle: Path) -> None:
 
 
 def test_parameters_after_failure_have_their_own_names() -> None:
-    part = export_part(setup_of(), "plant")
+    part = export_part(config_of(), "plant")
     names = {leaf.path.partition("|")[0] for leaf in part.image.leaves}
     assert {"plant", "plant.from_tick_651", "plant.from_tick_652", "plant.from_tick_653"} <= names
     assert part.events == [651, 652]

@@ -12,14 +12,14 @@ from lapwing.messages.topics import TRUTH
 from lapwing.services.process_table import create
 
 
-def digest_of_rows(setup: RunConfig, rows: np.ndarray) -> str:
+def digest_of_rows(config: RunConfig, rows: np.ndarray) -> str:
     """Return the digest of one row for each tick, as the recorder computes it."""
-    encoder = next(w for w in create(setup, "plant").encoders if w.topic.name == TRUTH.name)
+    encoder = next(w for w in create(config, "plant").encoders if w.topic.name == TRUTH.name)
     ticks = np.arange(len(rows))
     digest = Digest()
-    for page in encode(encoder, setup.port(encoder.port), setup, ticks, rows):
+    for page in encode(encoder, config.port(encoder.port), config, ticks, rows):
         payloads = np.ascontiguousarray(page.payloads).view(np.uint8).reshape(len(ticks), -1)
-        digest.update_page(TRUTH.name, page.ticks * setup.interval_ns, payloads)
+        digest.update_page(TRUTH.name, page.ticks * config.interval_ns, payloads)
     return digest.hexdigest()
 
 

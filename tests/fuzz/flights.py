@@ -8,13 +8,13 @@ from typing import Any
 
 import numpy as np
 
+from lapwing.flights.log_import.column_mapping import load_mapping
+from lapwing.flights.log_import.csv_flight import from_columns, read_csv_flight
+from lapwing.flights.log_import.dataflash_flight import read_dataflash_flight
+from lapwing.flights.log_import.tlog_flight import read_tlog_flight
+from lapwing.flights.log_import.ulog_flight import read_ulog_flight
+from lapwing.flights.log_import.usd_log import read_usd_log
 from lapwing.services.common.mavlink.dialect import mavlink
-from lapwing.studies.flight_import.column_mapping import load_mapping
-from lapwing.studies.flight_import.csv_flight import from_columns, read_csv_flight
-from lapwing.studies.flight_import.dataflash_flight import read_dataflash_flight
-from lapwing.studies.flight_import.tlog_flight import read_tlog_flight
-from lapwing.studies.flight_import.ulog_flight import read_ulog_flight
-from lapwing.studies.flight_import.usd_log import read_usd_log
 from tests.fuzz.memory_file import memory_file
 from tests.fuzz.target import Target
 

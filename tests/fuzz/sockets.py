@@ -14,7 +14,7 @@ from lapwing.services.foxglove.server import Server
 from lapwing.services.mavlink.adapter import Adapter
 from lapwing.services.mavlink.protocols import handlers
 from lapwing.services.mavlink.resolve import describe
-from lapwing.studies.view3d.local_server import Guard
+from lapwing.views.view3d.local_server import Guard
 from tests.fuzz.mutate import MOST
 from tests.fuzz.target import Target
 from tests.services.foxglove.client import Client

@@ -13,7 +13,8 @@ from lapwing.messages import PoseStamped, attachment
 from lapwing.messages.topics import POSE
 from lapwing.messages.types import TYPES
 from lapwing.services import scene_resolver
-from lapwing.services.common import flight_plan_file, parameter_file
+from lapwing.services.autopilot import parameter_file
+from lapwing.services.common.plans import plan_file
 from lapwing.services.foxglove.origin_gate import rejection_reason
 from tests.fuzz.flights import csv, dataflash, tlog, ulog, usd
 from tests.fuzz.memory_file import memory_file
@@ -74,8 +75,8 @@ def attachments() -> Target:
 
 
 def set_ups() -> Target:
-    setup = to_json(scene_resolver.resolve(scene_resolver.load("gyrostat_blocked")))
-    return Target(lambda data: from_json(data.decode()), (setup.encode(), to_json((1.0, {"a": [None]})).encode()))
+    config = to_json(scene_resolver.resolve(scene_resolver.load("gyrostat_blocked")))
+    return Target(lambda data: from_json(data.decode()), (config.encode(), to_json((1.0, {"a": [None]})).encode()))
 
 
 def scenes() -> Target:
@@ -87,8 +88,8 @@ def scenes() -> Target:
 
 def plans() -> Target:
     seeds = tuple(path.read_bytes() for path in sorted((SCENES / "plans").glob("*.plan")))
-    waypoints = b"QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t47.0\t8.0\t5.0\t1\n1\t0\t3\t22\t0\t0\t0\t0\t47.0\t8.0\t9.0\t1\n"
-    return Target(lambda data: flight_plan_file.read(memory_file(data, "a.plan")), (*seeds, waypoints))
+    waypoints = b"QGC WPL 110\n0\t1\t0\t16\t0\t0\t0\t0\t40.7\t14.7\t5\t1\n1\t0\t3\t22\t0\t0\t0\t0\t40.7\t14.7\t9\t1\n"
+    return Target(lambda data: plan_file.read(memory_file(data, "a.plan")), (*seeds, waypoints))
 
 
 def parameters() -> Target:
@@ -128,8 +129,8 @@ def overrides() -> Target:
 
 
 def set_up_messages() -> Target:
-    setup = scene_resolver.resolve(scene_resolver.load("gyrostat_blocked"))
-    return Target(serialise.decompress, (serialise.compress(setup),))
+    config = scene_resolver.resolve(scene_resolver.load("gyrostat_blocked"))
+    return Target(serialise.decompress, (serialise.compress(config),))
 
 
 def origins() -> Target:

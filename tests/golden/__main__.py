@@ -4,7 +4,7 @@ import argparse
 import sys
 
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
-from lapwing.cosim.executors.single_process import PAGE
+from lapwing.cosim.executors.single_process import KEPT_TICKS
 from lapwing.services.process_table import create_all
 from tests.cosim.memory_log import MemoryLog
 from tests.golden import digests, thinned_log
@@ -14,16 +14,16 @@ from tests.golden.digests import BEGINNING, Golden
 
 def fly(case: Case) -> tuple[MemoryLog, str]:
     """Return the complete flight of a case and the digest of its beginning."""
-    setup = case.resolve()
-    log, graph, beginning = MemoryLog(setup), BlockDiagram(setup, create_all(setup), PAGE), ""
-    stops = [round(BEGINNING * setup.rate) + 1, *range(PAGE, setup.last_tick + 1 + PAGE, PAGE)]
+    config = case.resolve()
+    log, diagram, beginning = MemoryLog(config), BlockDiagram(config, create_all(config), KEPT_TICKS), ""
+    stops = [round(BEGINNING * config.rate) + 1, *range(KEPT_TICKS, config.last_tick + 1 + KEPT_TICKS, KEPT_TICKS)]
     for stop in sorted(stops):
-        first = graph.tick
-        graph.advance(min(stop, setup.last_tick + 1))
-        log.write(graph.record_batches(first, graph.tick), graph.tick - 1)
+        first = diagram.tick
+        diagram.advance(min(stop, config.last_tick + 1))
+        log.write(diagram.record_batches(first, diagram.tick), diagram.tick - 1)
         if stop == stops[0]:
             beginning = log.digest
-        if graph.ended:
+        if diagram.ended:
             break
     return log, beginning
 

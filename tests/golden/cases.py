@@ -4,9 +4,7 @@ from pathlib import Path
 from typing import NamedTuple
 
 from lapwing.cosim.config.run_config import RunConfig
-from lapwing.services.common import flight_plan_file as plan
-from lapwing.services.common.environment_schema import environment
-from lapwing.services.common.vehicle_schema import start_height
+from lapwing.services.common.plans import plan_file as plan
 from lapwing.services.scene_resolver import load, resolve
 
 SCENES = Path(__file__).parents[2] / "lapwing/scenes"
@@ -24,7 +22,7 @@ class Case(NamedTuple):
         scene = load(self.scene, list(self.overrides))
         if self.plan is None:
             return resolve(scene)
-        commands = tuple(plan.read(self.plan, start_height(scene), environment(scene).home))
+        commands = plan.read(self.plan, plan.site_of(scene)).commands
         return resolve(scene, {scene.lookup("vehicle.name"): commands})
 
 

@@ -15,9 +15,9 @@ QUICK = {"gyrostat_blocked", "os4_motors", "hover"}
 
 @pytest.mark.parametrize("name", [n if n in QUICK else pytest.param(n, marks=pytest.mark.long) for n in CASES])
 def test_scene_flies_to_its_digest(name):
-    golden, setup = digests.read()[name], CASES[name].resolve()
+    golden, config = digests.read()[name], CASES[name].resolve()
     whole = name in WHOLE
-    log = fly(setup, last=None if whole else round(digests.BEGINNING * setup.rate))
+    log = fly(config, last=None if whole else round(digests.BEGINNING * config.rate))
     if log.digest != (golden.digest if whole else golden.beginning):
         result = thinned_log.first_difference(thinned_log.read(digests.sample_file(name)), log, whole)
         pytest.fail("\n".join(["differs from the golden digest; run `python -m tests.golden`", *result]))
@@ -40,7 +40,7 @@ class Changed:
     """Flight with changed payloads: {(topic, number): payload}."""
 
     def __init__(self, flown, changes):
-        self.setup, self.topics, self._flown, self._changes = flown.setup, flown.topics, flown, changes
+        self.config, self.topics, self._flown, self._changes = flown.config, flown.topics, flown, changes
 
     def payloads(self, name):
         return [(t, self._changes.get((name, i), p)) for i, (t, p) in enumerate(self._flown.payloads(name))]
@@ -55,8 +55,8 @@ def test_first_difference_has_field_and_size(flown, tmp_path):
     speed = tuple(w + 0.25 for w in truth[number].rotor_speed)
     later = {("ground_truth", i): m._replace(rotor_speed=speed).encode() for i, m in enumerate(truth) if i >= number}
     began, field = thinned_log.first_difference(kept, Changed(flown, later))
-    before, at = (t * flown.setup.interval for t in (number - 1, number + 1))
-    assert began.startswith(f"/{flown.setup.vehicle}/ground_truth: differs first, after t = ")
+    before, at = (t * flown.config.interval for t in (number - 1, number + 1))
+    assert began.startswith(f"/{flown.config.vehicle}/ground_truth: differs first, after t = ")
     after, until = (float(part.split(" s")[0]) for part in began.split("t = ")[1:])
     assert after <= before < until <= at
     old = truth[number].rotor_speed[0]
@@ -65,7 +65,7 @@ def test_first_difference_has_field_and_size(flown, tmp_path):
 
 def test_beginning_of_flight_equals_sample(flown):
     kept = thinned_log.take(flown)
-    short = fly(flown.setup, last=217)
+    short = fly(flown.config, last=217)
     assert thinned_log.first_difference(kept, short, whole=False) == []
     assert any("differs first" in line for line in thinned_log.first_difference(kept, short))
 
@@ -78,8 +78,8 @@ def test_change_between_sampled_messages_is_detected(flown):
 
 def test_added_and_removed_topics_are_named(flown):
     kept = thinned_log.take(flown)
-    gone = {f"/{flown.setup.vehicle}/more": kept[f"/{flown.setup.vehicle}/ground_truth"], **kept}
-    assert thinned_log.first_difference(gone, flown) == [f"/{flown.setup.vehicle}/more: this topic is gone"]
+    gone = {f"/{flown.config.vehicle}/more": kept[f"/{flown.config.vehicle}/ground_truth"], **kept}
+    assert thinned_log.first_difference(gone, flown) == [f"/{flown.config.vehicle}/more: this topic is gone"]
     del kept["/tf"]
     assert thinned_log.first_difference(kept, flown) == ["/tf: this topic is new"]
 

@@ -35,7 +35,7 @@ def take(log: MemoryLog) -> Sample:
     """Return the sample of a flight."""
     result = {}
     for name, topic in log.topics.items():
-        messages = [(tick * log.setup.interval_ns, payload) for tick, payload in log.payloads(name)]
+        messages = [(tick * log.config.interval_ns, payload) for tick, payload in log.payloads(name)]
         every = math.ceil(len(messages) / FINGERPRINTS)
         fingerprints, instants = _fingerprints(messages, every)
         large = bool(messages) and len(messages[0][1]) > LARGE
@@ -45,7 +45,7 @@ def take(log: MemoryLog) -> Sample:
             else sorted({0, 1, *range(0, len(messages), math.ceil(len(messages) / KEPT)), len(messages) - 1})
         )
         kept = [(messages[i][0], topic.message.type_name, messages[i][1]) for i in places if i < len(messages)]
-        result[topic.key(log.setup.vehicle)] = TopicSample(every, fingerprints, instants, kept)
+        result[topic.key(log.config.vehicle)] = TopicSample(every, fingerprints, instants, kept)
     return result
 
 
@@ -77,10 +77,7 @@ def read(path: Path) -> Sample:
     """Return a sample written by `write`."""
     with LogReader(path) as log:
         table = json.loads(zlib.decompress(log.attachments[HASHES_FILE]))
-        current = {recorded: name for name, recorded in log.recorded_names.items()}
-        result = {
-            current[name]: TopicSample(row[0], row[1], list(accumulate(row[2])), []) for name, row in table.items()
-        }
+        result = {name: TopicSample(row[0], row[1], list(accumulate(row[2])), []) for name, row in table.items()}
         for name, kind, time_ns, payload in log.messages():
             result[name].kept.append((time_ns, kind, payload))
     return result
@@ -94,14 +91,14 @@ def first_difference(old: Sample, new: MemoryLog, whole: bool = True) -> list[st
         new: flight.
         whole: True if it was flown to its end; otherwise only its beginning is compared.
     """
-    names = {topic.key(new.setup.vehicle): name for name, topic in new.topics.items()}
+    names = {topic.key(new.config.vehicle): name for name, topic in new.topics.items()}
     lines = [f"{name}: this topic is new" for name in sorted(names.keys() - old.keys())]
     lines += [f"{name}: this topic is gone" for name in sorted(old.keys() - names.keys())]
-    end_ns = math.inf if whole else max(new.payloads(name)[-1][0] for name in new.topics) * new.setup.interval_ns
+    end_ns = math.inf if whole else max(new.payloads(name)[-1][0] for name in new.topics) * new.config.interval_ns
     began: list[tuple[int, int, str]] = []
     fields: list[tuple[int, str]] = []
     for name in sorted(old.keys() & names.keys()):
-        messages = [(tick * new.setup.interval_ns, payload) for tick, payload in new.payloads(names[name])]
+        messages = [(tick * new.config.interval_ns, payload) for tick, payload in new.payloads(names[name])]
         began += _began(name, old[name], messages, end_ns)
         fields += _fields(name, old[name], messages, end_ns)
     if began:

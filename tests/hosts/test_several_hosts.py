@@ -9,6 +9,7 @@ from lapwing.cosim.log import LogReader
 from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.runs.single_process_run import fly_single
 from lapwing.services.scene_resolver import load, resolve
+from tests.combinations import NIGHTLY
 from tests.hosts.network import Network, why_not
 from tests.hosts.run import Run
 
@@ -21,7 +22,7 @@ HOSTS = {
     MONITOR: "log",
 }
 
-pytestmark = pytest.mark.long
+pytestmark = [pytest.mark.long, NIGHTLY]
 
 
 @pytest.fixture(scope="module")

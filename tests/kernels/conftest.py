@@ -66,7 +66,7 @@ def law(p):
 FORCES[Spring] = law
 """,
     "plant/factory.py": """
-from lapwing.kernels import kernel
+from lapwing.kernels import kernel, noinline
 from plant.inner import inner
 
 def times(n):
@@ -74,6 +74,16 @@ def times(n):
     def product(x):
         return n * inner(x)
     return product
+
+def shifted(n):
+    @noinline
+    def shift(x):
+        return n + x
+
+    @kernel
+    def total(x):
+        return shift(x) + 1.0
+    return total
 """,
     "plant/texts.py": """
 from lapwing.kernels import kernel

@@ -32,6 +32,14 @@ def test_second_process_compiles_no_kernel(package):
     assert second["loaded"] > 0
 
 
+def test_functions_with_equal_names_in_two_processes_stay_apart(package):
+    """LLVM links by names, and numba's end with a number that each process counts from 1."""
+    run = "from plant.factory import shifted; values['sums'] = [shifted(n)(1.0) for n in {}]"
+    assert [package.run(run.format([n]))["values"]["sums"] for n in (2.0, 5.0)] == [[4.0], [7.0]]
+    both = package.run(run.format([2.0, 5.0]))
+    assert (both["values"]["sums"], both["compiled"]) == ([4.0, 7.0], 0)
+
+
 def test_loading_kernels_does_not_import_numba_compiler_modules(package):
     names = "('numba.np.arraymath', 'scipy.linalg')"
     run = f"{OUTER}; import sys; values['imported'] = [name for name in {names} if name in sys.modules]"

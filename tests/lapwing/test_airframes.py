@@ -6,7 +6,7 @@ import pytest
 import lapwing
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.services.autopilot.stability_check import unstable_loops
-from lapwing.services.common.run_schema import SHIPPED
+from lapwing.services.common.schemas.run_schema import SHIPPED
 from lapwing.services.scene_resolver import load
 
 # worst RMSE of x, y [m]

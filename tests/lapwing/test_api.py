@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import lapwing
+from lapwing.services.autopilot.custom.estimator_api import StateEstimate
 from lapwing.services.common.controller_api import ThrustAndMoments
-from lapwing.services.common.estimator_api import StateEstimate
 
 MODULE = """
 from lapwing.services.common.controller_api import ThrustAndMoments
@@ -41,7 +41,7 @@ def altitude(tmp_path, monkeypatch):
 
 def test_class_copy_and_name_of_controller_fly_alike(altitude):
     named = lapwing.fly("hover", {**SHORT, "autopilot.controller": "given_altitude:Altitude"})
-    vehicle = named.setup.services["autopilot"].parameters.vehicle
+    vehicle = named.config.services["autopilot"].parameters.vehicle
     flights = [
         lapwing.fly("hover", SHORT, controller="given_altitude:Altitude"),
         lapwing.fly("hover", SHORT, controller=altitude),
@@ -49,7 +49,7 @@ def test_class_copy_and_name_of_controller_fly_alike(altitude):
         lapwing.fly(lapwing.load_scene("hover", SHORT), controller=type("Local", (altitude,), {})),
     ]
     assert {flight.digest for flight in flights} == {named.digest}
-    assert [len(flight.setup.modules) for flight in flights] == [1, 1, 0, 0]  # text that a log would store
+    assert [len(flight.config.modules) for flight in flights] == [1, 1, 0, 0]  # text that a log would store
     assert named.digest != lapwing.fly("hover", SHORT, controller=altitude, controller_options={"extra": 9.0}).digest
 
 
@@ -125,7 +125,7 @@ def test_later_overrides_of_loaded_scene_take_precedence():
     assert lapwing.load_scene(again) is again
     assert repr(again) == "<Scene hover, run.duration=1.5, run.seed=3, run.duration=0.5>"
     flight = lapwing.fly(scene, {"run.duration": 0.5}, seed=4)
-    assert (flight.setup.seed, flight.setup.duration) == (4, 0.5)
+    assert (flight.config.seed, flight.config.duration) == (4, 0.5)
     assert repr(flight).startswith("<Flight of hover: Completed at 0.50 s: ")
 
 
@@ -133,10 +133,10 @@ def test_campaign_varies_loaded_scene_by_seed_and_run():
     scene = lapwing.load_scene("hover", {"run.duration": 0.5})
     vary = {"vehicle.mass": lapwing.normal(10.4, 0.2)}
     flights = lapwing.campaign(scene, (5, 6, 7), vary, seed=4)
-    masses = [flight.setup.services["autopilot"].parameters.airframe.mass for flight in flights]
+    masses = [flight.config.services["autopilot"].parameters.airframe.mass for flight in flights]
     assert len(set(masses)) == 3
     assert 9.4 < min(masses) < max(masses) < 11.4
-    assert [flight.setup.seed for flight in flights] == [5, 6, 7]
+    assert [flight.config.seed for flight in flights] == [5, 6, 7]
     fewer = lapwing.campaign(scene, (5, 6), vary, seed=4)
     assert [f.digest for f in fewer] == [f.digest for f in flights[:2]]
 

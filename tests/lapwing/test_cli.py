@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 import lapwing
-from lapwing.cli.app import GROUPS
+from lapwing.cli.app import FIRST, GROUPS
 from lapwing.cosim.transport.bus_keys import check_key_prefix
 from lapwing.runs import single_process_run
 
@@ -49,10 +49,7 @@ BAD = {
     "no value": ([HOVER, "--set", "run.seed"], "override run.seed: expected KEY=VALUE"),
     "two lines": ([HOVER, "--set", 'run.title="a\nb'], "is not a TOML value"),
     "index": ([HOVER, "--set", "trajectory.phase.9.duration=1"], "expected an index from 0 to 3, got 9"),
-    "missing file": (
-        ["scenes/hovr.toml"],
-        "scenes/hovr.toml: no such file or directory; did you mean scenes/hover",
-    ),
+    "missing file": (["scenes/hovr.toml"], "scenes/hovr.toml: no such file or directory; did you mean scenes/hover"),
     "folder": (["scenes"], "scenes: is a folder; expected a scene file"),
     "log": ([HOVER, "--log", "none/a.mcap"], "none/a.mcap: cannot be written: there is no folder none; create it"),
     "log is a folder": ([HOVER, "--log", "scenes"], "scenes: is a folder"),
@@ -72,10 +69,7 @@ BAD = {
         [HOVER, "--listen", "tcp/0.0.0.0:1"],
         "--listen tcp/0.0.0.0:1: endpoint is not authenticated; use tls/",
     ),
-    "no keys": (
-        [HOVER, "--listen", "tls/0.0.0.0:1"],
-        "needs certificates; use --keys FOLDER",
-    ),
+    "no keys": ([HOVER, "--listen", "tls/0.0.0.0:1"], "needs certificates; use --keys FOLDER"),
     "viewers": (
         [HOVER, "--foxglove", "0.0.0.0:8799"],
         "--foxglove 0.0.0.0:8799: any program there could read the run; expected",
@@ -90,10 +84,7 @@ BAD = {
     "router alone": ([HOVER, "--ros2-router", "127.0.0.1:7447"], "--ros2-router 127.0.0.1:7447: expected with --ros2"),
     "router elsewhere": ([HOVER, "--ros2", "0", "--ros2-router", "robot:7447"], "robot:7447: programs of that host"),
     "program": ([HOVER, "--external", "autopilot=tcp/[::1]:1"], "use unixsock-stream/PATH in a folder of your"),
-    "real time": (
-        [HOVER, "--realtime", "--speed", "max"],
-        "--realtime: needs a limited speed",
-    ),
+    "real time": ([HOVER, "--realtime", "--speed", "max"], "--realtime: needs a limited speed"),
     "keys": ([HOVER, "--keys", "x"], "--keys: expected with --listen or --endpoints"),
     "door": ([HOVER, "--listen", "x"], "--listen x: expected an endpoint protocol/address:port"),
     "option": ([HOVER, "--lgo", "x"], "--lgo: unknown option; did you mean --log? (see lapwing run --help)"),
@@ -132,18 +123,9 @@ def test_invalid_run_is_rejected_in_one_line(lapwing, arguments, expected):
         (["replay", "none.mcap", "--listen", "x"], "--listen x: expected an endpoint protocol/address:port"),
         (["replay", "none.mcap", "--listen", "tcp/0.0.0.0:7999"], "tcp/0.0.0.0:7999: endpoint is not authenticated"),
         (["replay", "none.mcap", "--listen", "tcp/[::]:7999"], "127.0.0.1:7447, or --insecure"),
-        (
-            ["replay", "none.mcap", "--listen", "tcp/[::1]:7999"],
-            "none.mcap: cannot be read: no such file",
-        ),
-        (
-            ["replay", "none.mcap", "--listen", "tcp/localhost:7999"],
-            "none.mcap: cannot be read: no such file",
-        ),
-        (
-            ["replay", "none.mcap", "--listen", "unixsock-stream/x"],
-            "none.mcap: cannot be read: no such file",
-        ),
+        (["replay", "none.mcap", "--listen", "tcp/[::1]:7999"], "none.mcap: cannot be read: no such file"),
+        (["replay", "none.mcap", "--listen", "tcp/localhost:7999"], "none.mcap: cannot be read: no such file"),
+        (["replay", "none.mcap", "--listen", "unixsock-stream/x"], "none.mcap: cannot be read: no such file"),
         (
             ["replay", "none.mcap", "--listen", "tcp/0.0.0.0:7999", "--insecure"],
             "none.mcap: cannot be read: no such file",
@@ -216,10 +198,13 @@ def test_version(lapwing):
 def test_help_lists_commands_in_groups_on_single_lines():
     command = [sys.executable, "-m", "lapwing", "--help"]
     result = subprocess.run(command, env=os.environ | {"COLUMNS": "80"}, capture_output=True, text=True, check=True)
-    lines = result.stdout.split("Fly:\n")[1].splitlines()
-    names = [line.split()[0] for line in lines if line.startswith("  ")]
-    assert names == [name for group in GROUPS.values() for name in group]
-    assert all(line.endswith(".") and len(line) <= 80 for line in lines if line.startswith("  "))
+    lines = result.stdout.split("Start here:\n")[1].splitlines()
+    examples = [line.strip() for line in lines if line.strip().startswith("lapwing ")]
+    rows = [line for line in lines if line.startswith("  ") and line.strip() not in examples]
+    assert [line.split()[0] for line in rows] == [name for group in GROUPS.values() for name in group]
+    assert all(line.endswith(".") and len(line) <= 80 for line in rows)
+    assert examples == list(FIRST.values())
+    assert len(FIRST) == 8
     assert "Other:" not in result.stdout
     without = subprocess.run(
         command[:-1], env=os.environ | {"COLUMNS": "80"}, capture_output=True, text=True, check=True
@@ -256,7 +241,7 @@ def test_check_prints_configuration(lapwing):
     ("option", "value", "message"),
     [
         ("--runs", "0", "--runs 0: expected a number from 1 to 10000000"),
-        ("--vary", "vehicle.mass=normal(1", "expected a distribution (normal, uniform"),
+        ("--vary", "vehicle.mass=normal(1", "expected a distribution (normal, lognormal, uniform"),
         ("--vary", "vehicle.mass", "--vary vehicle.mass: expected KEY=DISTRIBUTION"),
         ("--design", "lsh", "--design lsh: expected one of random, lhs, sobol, grid"),
         ("--seed", "0", "--seed 0: expected a whole number from 1"),

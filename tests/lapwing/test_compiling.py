@@ -20,7 +20,7 @@ SERVICES = ("plant", "autopilot", "trajectory")  # of the hover scene
 
 
 @pytest.fixture(scope="module")
-def setup():
+def config():
     return resolve(load("hover"))
 
 
@@ -45,12 +45,12 @@ class Compiling:
         pass
 
 
-def test_compile_notice_appears_once_and_only_when_needed(setup):
+def test_compile_notice_appears_once_and_only_when_needed(config):
     output = []
-    with notify_on_compile(setup, output.append):
+    with notify_on_compile(config, output.append):
         pass
     assert output == []
-    with notify_on_compile(setup, output.append):
+    with notify_on_compile(config, output.append):
         compile_something()
     assert output == [Compilation("hover", SERVICES)]
 
@@ -71,10 +71,10 @@ def test_terminal_has_bar_and_other_streams_have_line():
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_precompile_shows_bar_or_one_line_per_scene(setup, monkeypatch, terminal):
+def test_precompile_shows_bar_or_one_line_per_scene(config, monkeypatch, terminal):
     monkeypatch.setattr(precompile, "BlockDiagram", Compiling)
     console = Console(file=io.StringIO(), force_terminal=terminal, width=100, markup=False)
-    compile_ahead({"one": setup, "two": setup}, console)
+    compile_ahead({"one": config, "two": config}, console)
     output = console.file.getvalue()
     assert output.count("ready after") == 2
     assert ("0 of 2 scenes  one" in output) == terminal
@@ -84,7 +84,7 @@ def test_precompile_shows_bar_or_one_line_per_scene(setup, monkeypatch, terminal
 
 def test_broken_scene_of_folder_does_not_stop_others(tmp_path, monkeypatch):
     compiled = []
-    monkeypatch.setattr("lapwing.runs.precompile.compile_ahead", lambda setups, console: compiled.extend(setups))
+    monkeypatch.setattr("lapwing.runs.precompile.compile_ahead", lambda configs, console: compiled.extend(configs))
     for name in ("a", "c"):
         (tmp_path / f"{name}.toml").write_text("[run")
     (tmp_path / "b.toml").write_bytes(Path("lapwing/scenes/hover.toml").read_bytes())

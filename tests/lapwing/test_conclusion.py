@@ -1,16 +1,18 @@
 """End of a run: outcome in terminal, report and JSON, and the exit code."""
 
 import json
+import re
 import signal
 from pathlib import Path
 
 import pytest
 
 import lapwing as package
+from lapwing.flights.flight_data import SHOWN, FlightData
+from lapwing.flights.metrics import metrics
 from lapwing.runs import single_process_run
-from lapwing.studies.flight_data import SHOWN, FlightData
-from lapwing.studies.metrics import metrics
-from lapwing.studies.report.page import flight_page
+from lapwing.views.report.key_numbers import key_numbers
+from lapwing.views.report.page import flight_page
 
 HOVER = ["run", "hover", "--mode", "single-process", "--log", "a.mcap", "--json", "a.json"]
 FALL = 'trajectory.phase.2.z={kind="ramp", to=-12.0, rate=8.0}'
@@ -24,14 +26,25 @@ def sets(*texts):
 def test_landing_summary_has_speed_place_events_degrees(lapwing):
     code, out, err = lapwing(*HOVER)
     assert (code, err) == (0, "")
-    assert "Landed at 8.52 s: upright on its feet, touched down at 0.95 m/s; ends at (0.00," in out
-    assert "0.10  contact  leaves the ground" in out
+    text = " ".join(out.split())
+    landing = re.search(
+        r"Landed at (\S+) s: upright on its feet, touched down at (\S+) m/s \(commanded (\S+)\)(.*?); ends at", text
+    )
+    assert landing, text
+    touched, commanded = float(landing[2]), float(landing[3])
+    assert (landing[4] == ", harder than commanded") == (touched > max(1.1 * commanded, 0.1) + 0.005), landing[0]
     assert "roll [°]" in out
     reported = json.loads(Path("a.json").read_text())
     assert (reported["outcome"]["kind"], reported["landed"]) == ("landed", True)
+    assert reported["outcome"]["mark"] == ("warn" if landing[4] else "good")
+    times = {event["text"]: event["time"] for event in reported["events"]}
+    assert times["armed"] <= times["leaves the ground"]
+    truth = FlightData.read("a.mcap")
+    assert times["armed"] == truth.actuators.times[truth.actuators.armed][0]
+    assert times["disarmed"] == pytest.approx(truth.actuators.times[truth.actuators.armed][-1] + 0.004)
     assert {"time": 6.0, "kind": "phase", "text": "descend"} in reported["events"]
     page = Path("a.html").read_text()
-    assert "Landed at 8.52 s" in page
+    assert f"Landed at {landing[1]} s" in page
     assert "<td>leaves the ground</td>" in page
 
 
@@ -39,10 +52,17 @@ def test_crash_has_separate_exit_code(lapwing):
     code, out, err = lapwing(*HOVER, *sets(FALL))
     assert (code, err.count("\n")) == (4, 1)
     assert "crashed; success.require: outcome in" in err
-    assert "hit the ground at 4.4 m/s" in out
+    assert out.index("Crashed at ") < out.index("time [s]")
+    assert re.search(
+        r"the setpoint led into the ground: hit the ground at 4\.4\d m/s \(commanded 8\.00, limit 2\)",
+        " ".join(out.split()),
+    )
     reported = json.loads(Path("a.json").read_text())
     assert (reported["outcome"]["kind"], reported["landed"]) == ("crashed", False)
-    assert "Crashed at " in Path("a.html").read_text()
+    page = Path("a.html").read_text()
+    assert "Crashed at " in page
+    assert 'class="good"' not in page
+    assert "good" not in [number.mark for number in key_numbers(FlightData.read("a.mcap"))]
 
 
 @pytest.mark.parametrize(
@@ -69,8 +89,8 @@ def test_divergence_is_reported_in_both_modes(lapwing, mode):
 def test_interrupted_run_is_aborted_with_report(lapwing, monkeypatch):
     advance = single_process_run.run_single
 
-    def interrupted(graph, recording, speed, observe, last):
-        advance(graph, recording, speed, lambda graph: signal.raise_signal(signal.SIGINT) or observe(graph), 500)
+    def interrupted(diagram, recording, speed, observe, last):
+        advance(diagram, recording, speed, lambda diagram: signal.raise_signal(signal.SIGINT) or observe(diagram), 500)
 
     monkeypatch.setattr(single_process_run, "run_single", interrupted)
     code, out, err = lapwing(*HOVER)

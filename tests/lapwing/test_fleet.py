@@ -9,7 +9,7 @@ from page_texts import page_text
 
 import lapwing
 from lapwing import Flight
-from lapwing.services.common.run_schema import SHIPPED
+from lapwing.services.common.schemas.run_schema import SHIPPED
 
 pytestmark = pytest.mark.long
 SHORT = ["--set", "run.duration=1.5"]
@@ -39,7 +39,7 @@ def test_fleet_summary_has_outcomes_and_separation(flown):
     assert "Nearest: " in output
     for name in figures["vehicles"]:
         flight = Flight.read(folder / "a.mcap", name)
-        assert (flight.vehicle, flight.setup.vehicle) == (name, name)
+        assert (flight.vehicle, flight.config.vehicle) == (name, name)
         assert flight.events
         assert list(flight.fleet) == ["left", "right", "scout"]
     assert Flight.read(folder / "a.mcap", "scout").origin.scene["vehicle"]["airframe"] == "quad_x"
@@ -114,3 +114,15 @@ def test_command_for_one_vehicle_rejects_fleet_in_one_line():
     assert done.returncode == 2, done.stderr
     assert "vehicle: there are 3; expected a scene with one vehicle" in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+def test_overlapping_vehicles_have_crashed_unless_collision_is_false(tmp_path):
+    """Without the effect nothing pushes them apart: two vehicles 0.1 m apart follow their paths and land."""
+    near = ["run", "fleet", "--set", "vehicle.1.initial_position=[0.0,2.9]", "--mode", "single-process", "--log"]
+    words = [sys.executable, "-m", "lapwing", *near, str(tmp_path / "a.mcap")]
+    done = subprocess.run(words, capture_output=True, text=True, check=False)
+    assert done.returncode == 4, done.stdout + done.stderr
+    text = " ".join(done.stdout.split())
+    assert "left: Crashed at 0.00 s: hit vehicle right" in text
+    assert "passes through it: the scene has no effects.collision" in text
+    assert "left: Landed" in command(*near, tmp_path / "b.mcap", "--set", "effects.collision=false")

@@ -47,7 +47,8 @@ def test_run_ends_with_one_line_and_complete_log(tmp_path, mode):
         assert "File too large" in log.metadata["failure"]
         assert log.digest() == log.metadata["digest"]
         times = [time_ns for topic, _, time_ns, _ in log.messages() if topic == "/drone1/ground_truth"]
-    assert times == [k * 4_000_000 for k in range(1000)]
+    assert len(times) >= 100  # a chunk ends after a quarter of a second of wall time
+    assert times == [k * 4_000_000 for k in range(len(times))]
 
 
 def test_log_without_flight_data_is_deleted(tmp_path):

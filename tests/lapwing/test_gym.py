@@ -1,5 +1,10 @@
 """Gymnasium environments: its checker, single and vector environments, and controllers that solve the tasks."""
 
+import copy
+import pickle
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -159,3 +164,47 @@ def test_finished_episode_restarts_without_others():
 def test_unknown_task_is_rejected():
     with pytest.raises(ValueError, match="task: expected one of Hover, Track, Land, Race, got 'Swim'"):
         lapwing.gym.DroneVectorEnv(1, "Swim")
+
+
+def test_make_imports_module_before_colon():
+    script = 'import gymnasium; gymnasium.make("lapwing.gym:lapwing/Hover-v0")'
+    subprocess.run([sys.executable, "-c", script], check=True)
+
+
+@pytest.mark.parametrize("copied", [copy.deepcopy, lambda each: pickle.loads(pickle.dumps(each))])
+def test_copy_continues_as_original(copied):
+    original = gymnasium.make("lapwing/Hover-v0")
+    original.reset(seed=3)
+    action = np.array([0.1, 0.2, -0.1, 0.0])
+    original.step(action)
+    other = copied(original)
+    assert np.array_equal(original.step(action)[0], other.step(action)[0])
+    moved = other.step(-action)[0]
+    assert not np.array_equal(original.step(action)[0], moved)  # the memory is its own
+    assert np.array_equal(original.reset()[0], other.reset()[0])  # the next random numbers are equal
+
+
+def test_seed_of_each_vehicle_equals_that_of_single_environment():
+    environments, one = many("Hover"), gymnasium.make("lapwing/Hover-v0")
+    seeds = [7, *range(100, 99 + environments.num_envs)]
+    observations, _ = environments.reset(seed=seeds)
+    assert np.array_equal(observations[0], one.reset(seed=7)[0])
+    assert environments.np_random_seed == tuple(seeds)
+    kept = environments.np_random[1]
+    environments.reset(seed=[7, None, *seeds[2:]])
+    assert environments.np_random[1] is kept
+    with pytest.raises(ValueError, match=r"^seed: expected \d+ seeds, one for each vehicle, got 1$"):
+        environments.reset(seed=[1])
+    assert isinstance(environments.unwrapped.reset(seed=1)[0], np.ndarray)
+    assert environments.np_random_seed == 1
+
+
+def test_generator_of_environment_is_used():
+    one = gymnasium.make("lapwing/Hover-v0").unwrapped
+    first = one.reset(seed=5)[0]
+    assert one.np_random_seed == 5
+    one.np_random = np.random.default_rng(0)
+    second = one.reset()[0]
+    one.np_random = np.random.default_rng(0)
+    assert np.array_equal(one.reset()[0], second)
+    assert not np.array_equal(first, second)

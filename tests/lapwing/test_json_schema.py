@@ -94,6 +94,15 @@ def test_schema_accepts_alternative_forms(key, value):
     assert faults("scene", changed(key, value)) == []
 
 
+def test_trajectory_has_phases_or_waypoints():
+    tree = {**MISSION, "trajectory": {"waypoints": [[0, 0, 5.0], [10.0, 0, 5.0]], "turn": "round"}}
+    assert faults("scene", tree) == []
+    tree["trajectory"]["waypoints"] = [{"latitude_deg": 40.0, "longitude_deg": 14.0, "z": 5.0, "yaw_deg": "90 deg"}]
+    assert faults("scene", tree) == []
+    tree["trajectory"]["phase"] = MISSION["trajectory"]["phase"]
+    assert faults("scene", tree) != []
+
+
 def test_misspelt_key_of_airframe_or_gain_set_is_invalid():
     frame = tomllib.loads(FILES["airframe"][0].read_text())
     frame["mass"]["totl"] = frame["mass"].pop("total")

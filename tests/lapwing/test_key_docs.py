@@ -6,10 +6,12 @@ import pytest
 from annotated_types import Gt, Le
 from pydantic import BaseModel, Field
 
+from lapwing.dynamics import effects
 from lapwing.dynamics.field_comments import comments, split
 from lapwing.dynamics.vehicles.airframe import Airframe
 from lapwing.file_schemas.annotations import schema_of
-from lapwing.file_schemas.json_schema import effect_tables, sensor_tables
+from lapwing.file_schemas.descriptions import effect_settings
+from lapwing.file_schemas.json_schema import sensor_tables
 from lapwing.file_schemas.key_docs import REQUIRED, keys
 from lapwing.services.scene_resolver import vocabulary
 from lapwing.services.sensors.fault_schedule import FaultTable
@@ -66,7 +68,7 @@ def test_keys_have_bounds_defaults_units_and_meanings():
 def _tables():
     """Return all tables of user files and their nested tables."""
     result = [*vocabulary().sections.values(), *KINDS.values(), Airframe, Phase, FaultTable]
-    result += [settings for _, settings in effect_tables().values()] + [cls for _, cls in sensor_tables().values()]
+    result += [effect_settings(name) for name in effects.names()] + [cls for _, cls in sensor_tables().values()]
     for table in result:
         result += [
             cls for key in keys(table) if key.name != "faults" for cls in _classes(key.hint) if cls not in result

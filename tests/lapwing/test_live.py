@@ -12,15 +12,15 @@ import numpy as np
 import pytest
 
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
-from lapwing.cosim.executors.single_process import PAGE
+from lapwing.cosim.executors.single_process import KEPT_TICKS
 from lapwing.messages import Log
-from lapwing.runs.live_feed import LiveFeed
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.studies.view3d import headless as chromium
+from lapwing.views.live.live_feed import LiveFeed
+from lapwing.views.view3d import headless as chromium
 
 pytest.importorskip("viser", reason="needs viser (pip install lapwing[view3d])")
-from lapwing.runs.live_page import LivePage
+from lapwing.views.live.live_page import LivePage
 
 pytestmark = pytest.mark.long
 
@@ -58,27 +58,27 @@ class Run:
     """A run in this process that publishes steps of half a second, like a launcher."""
 
     def __init__(self, scene="hover", overrides=()):
-        self.setup = resolve(load(scene, {"run.duration": 3.0, **dict(overrides)}))
-        self._graph = BlockDiagram(self.setup, create_all(self.setup), PAGE)
-        self.reporting_services, self.on_batches, self.time_ns = set(self.setup.services), None, 0
+        self.config = resolve(load(scene, {"run.duration": 3.0, **dict(overrides)}))
+        self._diagram = BlockDiagram(self.config, create_all(self.config), KEPT_TICKS)
+        self.reporting_services, self.on_batches, self.time_ns = set(self.config.services), None, 0
         self.published, self.complete = [], False
 
     def publish(self, key, time_ns, payload):
         self.published.append((key, time_ns, Log.decode(payload)))
 
     def step(self):
-        before, rows = self._graph.tick, self.setup.rate // 2
-        for first in range(before, before + rows, PAGE // 2):
-            stop = min(first + PAGE // 2, before + rows)
-            self._graph.advance(stop)
-            self.on_batches(self._graph.record_batches(first, stop))
-        self.time_ns = (before + rows - 1) * self.setup.interval_ns
+        before, rows = self._diagram.tick, self.config.rate // 2
+        for first in range(before, before + rows, KEPT_TICKS // 2):
+            stop = min(first + KEPT_TICKS // 2, before + rows)
+            self._diagram.advance(stop)
+            self.on_batches(self._diagram.record_batches(first, stop))
+        self.time_ns = (before + rows - 1) * self.config.interval_ns
 
 
 @pytest.mark.filterwarnings("error::DeprecationWarning")
 def show(run, page, frames):
     """Show a run at its start and in later frames."""
-    follow = LiveFeed(run.setup, [page.show])
+    follow = LiveFeed(run.config, [page.show])
     follow.observe(run)
     for _ in range(frames):
         run.step()
@@ -86,12 +86,12 @@ def show(run, page, frames):
 
 
 def test_page_opens_without_deprecated_options_of_viser():
-    with LivePage(Run().setup) as page:
+    with LivePage(Run().config) as page:
         assert page.address.startswith("http://127.0.0.1:")
 
 
 def test_page_needs_its_secret_its_host_and_its_origin():
-    with LivePage(Run().setup) as page:
+    with LivePage(Run().config) as page:
         port, token = re.fullmatch(r"http://127\.0\.0\.1:(\d+)/([\w-]{22})/", page.address).groups()
         answer = get(page.address)
         text = answer.read().decode()
@@ -116,7 +116,7 @@ def test_page_needs_its_secret_its_host_and_its_origin():
 
 def test_events_of_fleet_are_published_and_listed_by_vehicle():
     run = Run("fleet")
-    with LivePage(run.setup) as page:
+    with LivePage(run.config) as page:
         show(run, page, 2)
         names = [vehicle.name for vehicle in page._vehicles]
         lines = page._events.value.splitlines()
@@ -128,7 +128,7 @@ def test_events_of_fleet_are_published_and_listed_by_vehicle():
 
 def test_latest_scan_of_lidar_is_shown_live():
     run = Run(overrides={"sensors.lidar.columns": 36, "success.require": []})
-    with LivePage(run.setup) as page:
+    with LivePage(run.config) as page:
         show(run, page, 3)
         page._player.join(3.0)  # it shows the frames in the meantime
         (vehicle,) = page._vehicles
@@ -141,8 +141,8 @@ def test_latest_scan_of_lidar_is_shown_live():
 @pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
 def test_browser_follows_running_flight():
     run = Run()
-    with LivePage(run.setup) as page:
-        follow = LiveFeed(run.setup, [page.show])
+    with LivePage(run.config) as page:
+        follow = LiveFeed(run.config, [page.show])
         follow.observe(run)
         for _ in range(3):
             run.step()

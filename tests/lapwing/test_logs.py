@@ -50,7 +50,7 @@ def test_info_prints_provenance_topics_and_gaps(lapwing, tmp_path):
     assert lines["/drone1/ground_truth"].startswith("490 250 ")
     assert lines["/drone1/ground_truth"].endswith(" lapwing_msgs/msg/VehicleState 1, longest 0.044 s")
     assert "0.00 mode a;b" in " ".join(out.split())
-    assert lines["resimulate"] == "not possible: the log lacks an attachment setup.json"
+    assert lines["resimulate"] == "not possible: the log lacks an attachment config.json"
 
 
 def test_verify_recomputes_digest(lapwing, tmp_path):
@@ -291,7 +291,7 @@ def test_unchanged_types_of_other_version_are_replayed(lapwing, old):
         (["verify", "foreign.mcap"], "has no digest"),
         (["recover", "whole.mcap"], "no recovery is needed"),
         (["recover", "cut.mcap", "--out", "none/a.mcap"], "none/a.mcap: cannot be written"),
-        (["export", "whole.mcap"], "expected --parquet FOLDER, --csv FOLDER or --mat FILE"),
+        (["export", "whole.mcap"], "expected --parquet FOLDER, --csv FOLDER, --mat FILE or --ulog FILE"),
         (["export", "whole.mcap", "--csv", "csv", "--topics", "/x"], "the log has no topic /x; it has /clock"),
         (["export", "foreign.mcap", "--csv", "csv"], "unknown message type a"),
         (["export", "whole.mcap", "--csv", "whole.mcap"], "is the same file as FILE"),

@@ -3,6 +3,7 @@
 import ast
 import json
 import os
+import re
 import subprocess
 import sys
 import tomllib
@@ -61,11 +62,11 @@ def test_created_module_passes_its_test(tmp_path, kind):
 
 @pytest.mark.parametrize("kind", ["effect", "sensor", "controller", "estimator", "segment"])
 def test_created_module_flies_by_its_first_lines(tmp_path, kind):
-    assert run(tmp_path, "lapwing", "new", "scene", "my_flight").returncode == 0
     assert run(tmp_path, "lapwing", "new", kind, f"my_{kind}").returncode == 0
     text = ast.get_docstring(ast.parse((tmp_path / f"my_{kind}.py").read_text()))
     tables = tomllib.loads("\n".join(line for line in text.splitlines() if line.startswith("    ")))
     scene = tmp_path / "my_flight.toml"
+    scene.write_text(Path("lapwing/scenes/hover.toml").read_text())
     options = []
     if kind == "segment":
         first, separator, others = scene.read_text().rpartition("[[trajectory.phase]]")
@@ -83,8 +84,22 @@ def test_created_scene_flies(tmp_path):
     assert run(tmp_path, "lapwing", "new", "scene", "my_flight").stdout == "my_flight.toml\n"
     result = run(tmp_path, "lapwing", "run", "my_flight.toml", "--mode", "single-process")
     assert result.returncode == 0, result.stderr
+    assert re.search(r"Landed .* ends at \(6\.00, 4\.00, ", " ".join(result.stdout.split()))
     again = run(tmp_path, "lapwing", "new", "scene", "my_flight")
     assert (again.returncode, again.stderr.count("\n")) == (2, 1)
+
+
+def test_created_scene_has_its_own_title_and_valid_further_tables(tmp_path):
+    run(tmp_path, "lapwing", "new", "scene", "my_flight")
+    path = tmp_path / "my_flight.toml"
+    assert load(path).lookup("run.title") == "my flight: a first flight"
+    text = re.sub(r"^# (?=\[|[a-z_]+ = )", "", path.read_text(), flags=re.MULTILINE)
+    assert {"wind_dryden", "battery", "body_drag"} <= set(load_text(tmp_path / "all.toml", text)["effects"])
+
+
+def load_text(path, text):
+    path.write_text(text)
+    return load(path).resolved
 
 
 def test_existing_file_is_kept(tmp_path):

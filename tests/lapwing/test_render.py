@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 
 import lapwing as package
-from lapwing.studies.view3d import headless
-from lapwing.studies.view3d.render import Shot, write_film
+from lapwing.views.view3d import headless
+from lapwing.views.view3d.render import Shot, write_film
 
 pytest.importorskip("viser", reason="needs viser (pip install lapwing[view3d])")
 SMALL = ("--size", "160x120")

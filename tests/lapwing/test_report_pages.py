@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 from page_texts import page_text
 
-from lapwing.studies.view3d import headless
+from lapwing.views.view3d import headless
 
 LAPWING = Path(sysconfig.get_path("scripts")) / "lapwing"
 SMALL, WITH_VIEW = 2_000_000, 5_000_000  # [byte] of a page

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import lapwing
+from lapwing.api.simulator import Simulator
 from lapwing.services.common.ports import Setpoint
-from lapwing.simulator import Simulator
 
 STILL = {"autopilot.estimator": "ground_truth"}
 
@@ -16,7 +16,7 @@ STILL = {"autopilot.estimator": "ground_truth"}
 def test_vehicle_without_voltage_is_in_free_fall():
     sim = Simulator("hover", {"effects": {"gravity": {}, "rotor_thrust": {}}}, seed=1)
     seen = sim.step(motor_voltages=(0.0,) * 4, ticks=251)
-    start = sim.setup.services["plant"].parameters.start.vehicle.motion.position_world[2]
+    start = sim.config.services["plant"].parameters.start.vehicle.motion.position_world[2]
     assert seen.time == pytest.approx(1.0)
     assert seen.truth.position_world[2] - start == pytest.approx(-0.5 * 9.80665, rel=1e-3)
 

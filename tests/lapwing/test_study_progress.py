@@ -128,8 +128,7 @@ def test_work_that_may_end_early_has_upper_bound():
 
 
 @pytest.mark.parametrize(
-    ("terminal", "expected"),
-    [(True, "2 of 10 flights"), (False, r"2 of 10 flights: without \[gravity\]\n")],
+    ("terminal", "expected"), [(True, "2 of 10 flights"), (False, r"2 of 10 flights: without \[gravity\]\n")]
 )
 def test_terminal_has_bar_and_other_streams_have_lines(terminal, expected):
     console = Console(file=io.StringIO(), force_terminal=terminal, width=100, markup=False)

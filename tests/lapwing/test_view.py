@@ -6,7 +6,7 @@ import webbrowser
 import pytest
 
 import lapwing as package
-from lapwing import rerun
+from lapwing.views import rerun_export as rerun
 
 
 def _fly(scene, folder):

@@ -4,7 +4,7 @@ import pytest
 
 from lapwing.messages import Imu, Status, VehicleState, header
 from lapwing.messages.message_diff import first_difference
-from lapwing.messages.units import unit
+from lapwing.messages.types import unit
 
 
 def test_first_different_field_has_both_values():

@@ -2,8 +2,8 @@
 
 import pytest
 
+from lapwing.cosim.log.log_reader import first_type_difference
 from lapwing.messages import TYPES
-from lapwing.messages.type_compatibility import first_type_difference
 
 STATE = "lapwing_msgs/msg/VehicleState"
 TEXT = TYPES[STATE].schema_text

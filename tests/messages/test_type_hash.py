@@ -5,7 +5,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 from lapwing.messages import TYPES
 from lapwing.messages.parse import parse
-from lapwing.messages.type_hash import known_type_hash, type_hash
+from lapwing.services.ros2.node import known_type_hash, type_hash
 
 STANDARD = get_typestore(Stores.ROS2_JAZZY)
 PUBLISHED = {  # from rmw_zenoh's documentation and ROS 2 nodes

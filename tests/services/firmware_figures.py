@@ -1,8 +1,8 @@
 """Figures of flights with real firmwares, for docs/guides/autopilots.md.
 
-LAPWING_PX4=PATH python -m tests.services.firmware_figures px4 --starts 20
-LAPWING_ARDUCOPTER=PATH python -m tests.services.firmware_figures ardupilot --starts 20
-LAPWING_BETAFLIGHT=PATH python -m tests.services.firmware_figures betaflight
+PX4=PATH python -m tests.services.firmware_figures px4 --starts 20
+ARDUCOPTER=PATH python -m tests.services.firmware_figures ardupilot --starts 20
+BETAFLIGHT=PATH python -m tests.services.firmware_figures betaflight
 
 python -m tests.services.firmware_figures ardupilot --scripted --set run.duration=15
 
@@ -23,11 +23,11 @@ from pathlib import Path
 
 import numpy as np
 
-from lapwing.flight import Flight
-from lapwing.services.common.vehicle_schema import airframe, gravity, thrust_coefficient
+from lapwing.api.flight import Flight
+from lapwing.services.common.schemas.vehicle_schema import airframe, gravity, thrust_coefficient
 from lapwing.services.scene_resolver import load
 
-VARIABLES = {"px4": "LAPWING_PX4", "ardupilot": "LAPWING_ARDUCOPTER", "betaflight": "LAPWING_BETAFLIGHT"}
+VARIABLES = {"px4": "PX4", "ardupilot": "ARDUCOPTER", "betaflight": "BETAFLIGHT"}
 SCRIPTED = {"px4": "px4/scripted_px4.py", "ardupilot": "ardupilot/scripted_ardupilot.py"}
 SQUARE = 10.0 * np.array([(0.0, 0.0), (1.0, 0.0), (1.0, 1.0), (0.0, 1.0), (0.0, 0.0)])  # [m] of the shipped missions
 SLOW = 0.1  # [m/s] highest speed in hover

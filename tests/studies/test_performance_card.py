@@ -20,8 +20,8 @@ from lapwing.services.autopilot.controller_parameters import shares as law_share
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.json_file import write_json
-from lapwing.studies.performance_card import card, show
-from lapwing.studies.terminal import console
+from lapwing.studies.performance import card, show
+from lapwing.views.terminal import console
 
 ROOT = Path(__file__).parents[2]
 VEHICLE = ROOT / "lapwing/scenes/vehicles/delivery_drone.toml"

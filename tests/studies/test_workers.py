@@ -75,7 +75,7 @@ LOST = """
 import os
 import lapwing.studies.stability.case_runner as case_runner
 from lapwing.cli.entry_point import main
-from lapwing.studies.stability import stability_command
+from lapwing.views.studies import stability_result
 
 def lost(name, sweep):
     os._exit(9)

@@ -79,11 +79,11 @@ impl Bus {
     }
 
     /// Answer queries for the run configuration, declare presence, and wait for all of `others`.
-    pub fn join(&self, setup: String, others: &[String]) -> LivelinessToken {
-        let key = format!("{}/_setup/{}", self.key_prefix, self.name);
+    pub fn join(&self, config: String, others: &[String]) -> LivelinessToken {
+        let key = format!("{}/_config/{}", self.key_prefix, self.name);
         let reply = key.clone();
         let answer = move |query: zenoh::query::Query| {
-            query.reply(reply.clone(), setup.clone()).wait().ok();
+            query.reply(reply.clone(), config.clone()).wait().ok();
         };
         self.session
             .declare_queryable(key)

@@ -63,8 +63,8 @@ pub struct Controller {
 }
 
 impl Vehicle {
-    pub fn of(setup: &Value) -> Vehicle {
-        let a = &setup["services"]["autopilot"]["parameters"]["airframe"];
+    pub fn of(config: &Value) -> Vehicle {
+        let a = &config["services"]["autopilot"]["parameters"]["airframe"];
         let f = |value: &Value| value.as_f64().expect("a number");
         let motor = &a["motor"];
         Vehicle {

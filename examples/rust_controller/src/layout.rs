@@ -57,8 +57,8 @@ impl Port {
 pub struct Layout {
     pub interval_ns: i64,
     pub services: Vec<String>,
-    pub setup_text: String,
-    pub setup: Value,
+    pub config_text: String,
+    pub config: Value,
     tree: Value,
 }
 
@@ -66,7 +66,7 @@ impl Layout {
     pub fn read(path: &str) -> Layout {
         let text = std::fs::read_to_string(path).unwrap_or_else(|e| panic!("{path}: {e}"));
         let tree: Value = serde_json::from_str(&text).unwrap_or_else(|e| panic!("{path}: {e}"));
-        let setup_text = tree["setup"].as_str().expect("setup").to_string();
+        let config_text = tree["config"].as_str().expect("config").to_string();
         Layout {
             interval_ns: tree["interval_ns"].as_i64().expect("interval_ns"),
             services: tree["services"]
@@ -75,8 +75,8 @@ impl Layout {
                 .keys()
                 .cloned()
                 .collect(),
-            setup: serde_json::from_str(&setup_text).expect("setup"),
-            setup_text,
+            config: serde_json::from_str(&config_text).expect("config"),
+            config_text,
             tree,
         }
     }

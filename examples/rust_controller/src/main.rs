@@ -50,8 +50,8 @@ fn fly(layout: &Layout, bus: &Bus) {
         .collect();
     others.extend(["recorder".to_string(), format!("{NAME}_messages")]);
     let mut controller =
-        Controller::new(Vehicle::of(&layout.setup), 1e-9 * layout.interval_ns as f64);
-    let _token = bus.join(layout.setup_text.clone(), &others);
+        Controller::new(Vehicle::of(&layout.config), 1e-9 * layout.interval_ns as f64);
+    let _token = bus.join(layout.config_text.clone(), &others);
     for tick in 0.. {
         let time_ns = tick * layout.interval_ns;
         let received = from_plant.take(time_ns, bus, &mut waiting);

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from typing import Any
 
 from lapwing.cosim.access.private_sockets import SCHEME
-from lapwing.cosim.transport.bus_keys import SETUP_KEY
+from lapwing.cosim.transport.bus_keys import CONFIG_KEY
 
 VIEWER = "viewer"  # common name of the certificate that may read and not publish
 
@@ -24,7 +24,7 @@ def by_certificate(key_prefix: str, publishable: Mapping[str, Iterable[str]]) ->
     everything = f"{key_prefix}/**"
     rules = [
         *_reading(everything),
-        _rule("query", ["query"], "ingress", [f"{key_prefix}/{SETUP_KEY}/*"]),
+        _rule("query", ["query"], "ingress", [f"{key_prefix}/{CONFIG_KEY}/*"]),
         *(_rule(f"publish {name}", _PUBLISH, "ingress", keys) for name, keys in publishable.items()),
     ]
     subjects = [{"id": name, "cert_common_names": [name]} for name in [*publishable, VIEWER]]

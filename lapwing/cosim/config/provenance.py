@@ -11,7 +11,7 @@ from pathlib import Path
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.config.serialise import digest, to_json
 
-SETUP_FILE = "setup.json"
+CONFIG_FILE = "config.json"
 MACHINE = ("python", "packages", "system", "processor")  # keys of the recording machine
 FAILURE, DIVERGED = "failure", "diverged"  # keys of a run that ended early: the reason, and whether it diverged
 
@@ -19,20 +19,20 @@ _GIT_TIMEOUT = 60.0  # [s] a busy machine needs several seconds; a folder on a s
 WAITED = "waited_for_disk"  # key of a run that waited for the disk: the waiting time
 
 
-def metadata(setup: RunConfig, mode: str) -> dict[str, str]:
+def metadata(config: RunConfig, mode: str) -> dict[str, str]:
     """Return the entries of the log's "lapwing" metadata record, all text."""
-    solver = setup.resolved.get("solver", {})
+    solver = config.resolved.get("solver", {})
     return {
-        "scene": setup.scene,
-        "seed": str(setup.seed),
+        "scene": config.scene,
+        "seed": str(config.seed),
         "mode": mode,
-        "vehicle": ", ".join(setup.vehicles),
-        "setup": digest(setup),
+        "vehicle": ", ".join(config.vehicles),
+        "config": digest(config),
         "version": package_version(),
         "commit": source_commit(),
         **machine(),
-        "exchange_rate": str(setup.rate),
-        "coupling": setup.coupling,
+        "exchange_rate": str(config.rate),
+        "coupling": config.coupling,
         **{f"solver_{key}": str(value) for key, value in solver.items()},
     }
 
@@ -50,9 +50,9 @@ def failure(text: str, diverged: bool = False) -> dict[str, str]:
     return {FAILURE: text, **({DIVERGED: "yes"} if diverged else {})}
 
 
-def attachments(setup: RunConfig, sources: Mapping[str, str]) -> dict[str, bytes]:
+def attachments(config: RunConfig, sources: Mapping[str, str]) -> dict[str, bytes]:
     """Return the attachments of a log: the run configuration, for resimulation, and its source files."""
-    return {SETUP_FILE: to_json(setup).encode(), **{name: text.encode() for name, text in sources.items()}}
+    return {CONFIG_FILE: to_json(config).encode(), **{name: text.encode() for name, text in sources.items()}}
 
 
 def package_version() -> str:

@@ -22,9 +22,6 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.cosim.config.former_names import FORMER_PACKAGES, present_fields, present_name
-from lapwing.messages.former_names import current_fields
-
 TAG = "$"
 LARGEST = 1 << 26  # [bytes] limit of the text of a run configuration; typical ones have up to a few million
 DTYPES = ("bool", "float64", "int64")  # types of arrays
@@ -194,9 +191,6 @@ def _allowed_dtype(dtype: Any, allowed: Collection[str]) -> str:
 
 def _record(cls: type, name: str, members: dict[str, Any]) -> Any:
     if set(members) != set(_fields(cls)):
-        path = f"{cls.__module__}:{cls.__qualname__}"
-        members = present_fields(path, current_fields(path, members))
-    if set(members) != set(_fields(cls)):
         raise ValueError(f"{name}: has the fields {', '.join(_fields(cls))}, got {', '.join(members)}")
     return cls(**members)
 
@@ -221,9 +215,6 @@ def _name_of(cls: type) -> str:
 
 def _class_of(name: str, modules: Collection[str]) -> type:
     module, _, path = name.partition(":")
-    declared = module in modules  # a declared module may have the name of a former package
-    if not declared and module.partition(".")[0] in FORMER_PACKAGES:
-        return _class_of(present_name(name), modules)
     if module.partition(".")[0] not in OWN and module not in sys.modules and module not in modules:
         raise ValueError(f"{name}: no such class; expected one of {', '.join(OWN)} or of a declared module")
     try:
@@ -231,8 +222,6 @@ def _class_of(name: str, modules: Collection[str]) -> type:
         for part in path.split("."):
             result = getattr(result, part)
     except (ImportError, AttributeError, TypeError, ValueError) as error:
-        if not declared and (present := present_name(name)) != name:
-            return _class_of(present, modules)
         raise ValueError(f"{name}: no such class can be imported ({error})") from None
     if not (isinstance(result, type) and _is_record(result)):
         raise ValueError(f"{name}: expected a NamedTuple or a frozen dataclass")

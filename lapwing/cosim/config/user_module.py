@@ -188,7 +188,8 @@ def _folder_of_this_process() -> Path:
 
 def blame(error: BaseException, module: ModuleType) -> str:
     """Return the message of an exception, with the last line of the module in its traceback or compile error."""
-    text, file = str(error).strip(), getattr(module, "__file__", None)  # None for code of an interactive prompt
+    text = _COLOUR.sub("", str(error)).strip()
+    file = getattr(module, "__file__", None)  # None for code of an interactive prompt
     lines = [f.lineno for f in traceback.extract_tb(error.__traceback__) if f.filename == file]
     where = f" ({Path(str(file)).name}, line {lines[-1]})" if lines else ""
     message = text.partition("\n")[0]
@@ -197,6 +198,8 @@ def blame(error: BaseException, module: ModuleType) -> str:
     return f"{type(error).__name__}{': ' if message else ''}{message}{where}"
 
 
+# numba colours its messages where the package colorama is installed
+_COLOUR = re.compile(r"\x1b\[[0-9;]*m")
 _SOURCE_LINE = re.compile(r'^ *File "([^"]+)", line (\d+)', re.MULTILINE)  # in a message of numba's compiler
 _CONTEXT = ("Failed in", "During:", "raised from", "With argument", "Rejected", "- Of which", "Overload", ">>>")
 

@@ -6,7 +6,9 @@ the blocks of all services.
 
 from collections.abc import Callable, Collection, Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from operator import itemgetter
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,7 +18,7 @@ from lapwing.cosim.diagram.compiled_block import Block, BoundBlock, bind
 from lapwing.cosim.diagram.execution_groups import ExecutionGroup, advance_groups, independent_groups
 from lapwing.cosim.diagram.port_rows import PortRows
 from lapwing.cosim.diagram.tick_schedule import Port
-from lapwing.cosim.diagram.topic_encoder import RecordBatch, TopicEncoder, due_ticks, encode, to_record_batches
+from lapwing.cosim.diagram.topic_encoder import RecordBatch, TopicEncoder, encode, to_record_batches
 from lapwing.cosim.run_errors import DivergedError, LockStepError
 from lapwing.messages.topics import Topic
 
@@ -30,8 +32,8 @@ class Service:
     A block is a compiled `Block`, or a Python object with a `name`, `outputs` (ports), and the methods `bind(diagram)`,
     called before the first tick, and `on_tick(tick)`, which runs the block and returns the tick of its next wake-up, or
     NEVER to wait for another block. If it has a connection to a program outside the run, it also has
-    `open(report_wait)`, `close()` and `reports`, entries of the log's metadata; each wait, in `open` and `on_tick`,
-    calls `report_wait` with a text.
+    `open(report_wait, log)`, `close()` and `reports`, entries of the log's metadata. Each wait, in `open` and
+    `on_tick`, calls `report_wait` with a text; files of the program are kept beside `log`, the path of the log or None.
     """
 
     name: str
@@ -52,7 +54,7 @@ class ExternalBlock:
     def __init__(self, name: str, *outputs: Port):
         self.name, self.outputs = name, outputs
 
-    def bind(self, graph: "BlockDiagram") -> None:
+    def bind(self, diagram: "BlockDiagram") -> None:
         """Do nothing."""
 
     def on_tick(self, tick: int) -> int:
@@ -60,36 +62,41 @@ class ExternalBlock:
         return NEVER
 
 
+def is_connected(part: Any) -> bool:
+    """Return True if a block has a connection to a program outside the run: its class has `reports`."""
+    return hasattr(type(part), "reports")  # of a block, an error in that property would count as its absence
+
+
 class BlockDiagram(PortRows):
     """Block diagram of one or more services.
 
     Attributes:
-        setup: run configuration.
+        config: run configuration.
         tick: next tick.
         ended: True after the last tick of the run.
     """
 
     def __init__(
         self,
-        setup: RunConfig,
+        config: RunConfig,
         services: Sequence[Service],
-        page: int,
+        kept_ticks: int,
         whole: Collection[str] = (),
         rows: dict[str, np.ndarray] | None = None,
     ):
         """Bind services, in their order of execution.
 
         Args:
-            setup: run configuration.
+            config: run configuration.
             services: all services of the run, or one.
-            page: number of most recent ticks whose rows are kept.
+            kept_ticks: number of most recent ticks whose rows are kept.
             whole: names of the ports with full history.
             rows: rows of a diagram that is no longer needed; their memory is reused if the shape is equal.
         """
-        self.setup, self.services = setup, services
+        self.config, self.services = config, services
         self.tick, self.ended = 0, False
         parts = [part for service in services for part in service.parts]
-        ports = dict(setup.ports)
+        ports = dict(config.ports)
         for part in parts:
             ports |= {port.name: port for port in part.outputs}
         port_names = {port.name for part in parts for port in part.outputs}
@@ -101,7 +108,11 @@ class BlockDiagram(PortRows):
         for part in parts:
             for i in getattr(part, "inputs", ()):
                 delays[i.port] = max(delays.get(i.port, 0), i.delay)
-        depths = {name: setup.last_tick + 1 if name in whole else page + delays.get(name, 0) for name in port_names}
+        for encoder in (encoder for service in services for encoder in service.encoders if encoder.on_change):
+            delays[encoder.port] = max(delays.get(encoder.port, 0), 1)
+        depths = {
+            name: config.last_tick + 1 if name in whole else kept_ticks + delays.get(name, 0) for name in port_names
+        }
         super().__init__(ports, depths, delays, rows)
         self._parts = parts
         self._codes: list[BoundBlock | None] = []
@@ -114,12 +125,12 @@ class BlockDiagram(PortRows):
 
     @property
     def _connected(self) -> list[Any]:
-        return [part for part in self._parts if hasattr(part, "reports")]
+        return [part for part in self._parts if is_connected(part)]
 
-    def open(self, report_wait: Callable[[str], None] = lambda text: None) -> None:
+    def open(self, report_wait: Callable[[str], None] = lambda text: None, log: Path | None = None) -> None:
         """Connect the blocks to their programs outside the run. `report_wait` receives a text for each wait."""
         for part in self._connected:
-            part.open(report_wait)
+            part.open(report_wait, log)
 
     def close(self) -> None:
         """Close the connections to programs outside the run."""
@@ -180,11 +191,6 @@ class BlockDiagram(PortRows):
         if len(self._groups) == 1:
             self.tick = tick
 
-    def finish(self) -> None:
-        """End the run after the current tick; for Python blocks."""
-        for group in self._groups:
-            group.finish()
-
     def history(self, port: str, every: int) -> np.ndarray:
         """Return the rows of a port with full history, every `every` ticks from 0; a view, shape (n, width)."""
         period = self.ports[port].period
@@ -205,11 +211,11 @@ class BlockDiagram(PortRows):
         result: list[RecordBatch] = []
         for service in self.services:
             for encoder in service.encoders:
-                ticks = due_ticks(first, stop, encoder.period)
-                if len(ticks) and (encoder.topic.recorded if topics is None else encoder.topic in topics):
-                    result += encode(
-                        encoder, self.ports[encoder.port], self.setup, ticks, self.rows(encoder.port, ticks)
-                    )
+                if not (encoder.topic.recorded if topics is None else encoder.topic in topics):
+                    continue
+                rows = partial(self.rows, encoder.port)
+                if len(ticks := encoder.message_ticks(first, stop, rows)):
+                    result += encode(encoder, self.ports[encoder.port], self.config, ticks, rows(ticks))
             python_messages = [
                 m for m in service.messages if first <= m[1] < stop and (topics is None or m[0] in topics)
             ]

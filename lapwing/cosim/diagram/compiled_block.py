@@ -10,16 +10,14 @@ the same machine code by its address, so the results of all executors are bit-fo
 """
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Any, NamedTuple
 
 import numba
 import numpy as np
-from llvmlite import ir
 from numba import types
-from numba.extending import intrinsic
 
 from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port, due
 from lapwing.kernels import always_inline, kernel, no_refcount
@@ -41,7 +39,7 @@ class InputSample(NamedTuple):
 class InputRing(NamedTuple):
     """Ring buffer of rows that an input reads."""
 
-    like: Any
+    example: Any
     rows: np.ndarray  # (depth, width), the depth a power of two
     period: int
     delay: int
@@ -106,7 +104,7 @@ def bind(part: Block, ports: dict[str, Port], rows: dict[str, np.ndarray]) -> Bo
         ports: ports by name.
         rows: ring buffer of each port by name, shape (2^k, width).
     """
-    inputs = tuple(InputRing(ports[i.port].like, rows[i.port], ports[i.port].period, i.delay) for i in part.inputs)
+    inputs = tuple(InputRing(ports[i.port].example, rows[i.port], ports[i.port].period, i.delay) for i in part.inputs)
     outputs = tuple(OutputRing(rows[port.name], port.period) for port in part.outputs)
     cell = Cell(BlockData(part.parameters, part.state, inputs, outputs))
     return BoundBlock(_address(numba.typeof(cell), part.trusted), cell.memory.pointer, cell)
@@ -138,7 +136,7 @@ def ring_index(stamp: int, period: int, rows: np.ndarray) -> int:
 @always_inline
 def _take(ring: InputRing, tick: int) -> InputSample:
     stamp = due(tick, ring.period, ring.delay)
-    return InputSample(stamp >= 0, load(ring.like, ring.rows, ring_index(stamp, ring.period, ring.rows)))
+    return InputSample(stamp >= 0, load(ring.example, ring.rows, ring_index(stamp, ring.period, ring.rows)))
 
 
 @always_inline
@@ -173,76 +171,3 @@ def advance(memory: Any, tick: int) -> int:
 def advance_counted(memory: Any, tick: int) -> int:
     """Advance a block whose step may replace an array (docs/explanation/decisions/0017): references are counted."""
     return advance(memory, tick)
-
-
-@intrinsic
-def _invoke(typing_context: Any, function: types.Type, memory: types.Type, tick: types.Type) -> tuple[Any, Callable]:
-    def generate(context: Any, builder: ir.IRBuilder, signature: Any, arguments: Sequence[ir.Value]) -> ir.Value:
-        pointer = ir.IntType(8).as_pointer()
-        structure = ir.LiteralStructType([pointer])
-        kind = ir.FunctionType(ir.IntType(64), [structure, ir.IntType(64)])
-        cell = builder.insert_value(ir.Constant(structure, ir.Undefined), builder.inttoptr(arguments[1], pointer), 0)
-        return builder.call(builder.inttoptr(arguments[0], kind.as_pointer()), [cell, arguments[2]])
-
-    return types.int64(types.int64, types.int64, types.int64), generate
-
-
-class Schedule(NamedTuple):
-    """Blocks of a diagram in their order of execution, for the compiled loop."""
-
-    function: np.ndarray  # (n,) int64 address; 0: a Python block
-    memory: np.ndarray  # (n,) int64 address
-    every: np.ndarray  # (n,) int64 [ticks] between two steps of a compiled block
-    next: np.ndarray  # (n,) int64 tick of the next step
-    vehicle: np.ndarray  # (n,) int64 number of the block's vehicle
-    done: np.ndarray  # (vehicles,) int64: 1 after a block of the vehicle has finished
-    ended: np.ndarray  # (1,) int64: 1 after all vehicles have finished
-
-
-def schedule(codes: Sequence[BoundBlock | None], every: Sequence[int], vehicles: Sequence[str]) -> Schedule:
-    """Return the schedule of blocks with the vehicle of each. None is a Python block, which first runs at tick 0."""
-    names = list(dict.fromkeys(vehicles)) or [""]
-    return Schedule(
-        np.array([code.function if code else 0 for code in codes], np.int64),
-        np.array([code.memory if code else 0 for code in codes], np.int64),
-        np.array(every, np.int64),
-        np.zeros(len(codes), np.int64),
-        np.array([names.index(name) for name in vehicles], np.int64),
-        np.zeros(len(names), np.int64),
-        np.zeros(1, np.int64),
-    )
-
-
-@kernel
-def run(schedule: Any, tick: int, first: int, stop: int) -> tuple[int, int, int]:
-    """Run the schedule in a cell from block `first` of `tick` to the tick `stop` (exclusive), or to a Python block.
-
-    Returns:
-        (tick, block, status). WAKE_PYTHON: run the Python block at the tick, then continue with the next block.
-        NON_FINITE: the state of the block is non-finite. FINISHED: the previous tick was the last. CONTINUE: the tick
-        is `stop`.
-    """
-    plan = schedule.value
-    while tick < stop:
-        for k in range(first, len(plan.function)):
-            if plan.next[k] > tick:
-                continue
-            if plan.function[k] == 0:
-                return tick, k, WAKE_PYTHON
-            plan.next[k] = tick + plan.every[k]
-            status = _invoke(plan.function[k], plan.memory[k], tick)
-            if status != CONTINUE:
-                if status == NON_FINITE:
-                    return tick, k, NON_FINITE
-                if status == FINISHED:
-                    plan.done[plan.vehicle[k]] = 1
-                    plan.ended[0] = plan.done.min()
-                elif status == WAKE_PYTHON:
-                    for j in range(k + 1, len(plan.function)):
-                        if plan.function[j] == 0 and plan.vehicle[j] == plan.vehicle[k]:
-                            plan.next[j] = tick
-        first = 0
-        tick += 1
-        if plan.ended[0] == 1:
-            return tick, 0, FINISHED
-    return tick, 0, CONTINUE

@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.cosim.diagram.compiled_block import CONTINUE, FINISHED, NON_FINITE, WAKE_PYTHON, BoundBlock, run, schedule
+from lapwing.cosim.diagram.compiled_block import CONTINUE, FINISHED, NON_FINITE, WAKE_PYTHON, BoundBlock
+from lapwing.cosim.diagram.compiled_loop import IDLE, RUNNING, run, schedule
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels.cell import Cell
 
@@ -41,7 +42,7 @@ class ExecutionGroup:
         self.parts, self.tick, self.finished = list(numbers), 0, False
         own = [parts[k] for k in numbers]
         every, vehicles = [getattr(part, "every", 1) for part in own], [getattr(part, "vehicle", "") for part in own]
-        plan = schedule([codes[k] for k in numbers], every, vehicles)
+        plan = schedule([codes[k] for k in numbers], every, vehicles, [part.name for part in own])
         self._plan = plan._replace(done=np.append(plan.done, 1))  # the last entry: 1 if the group may end
         self._cell = Cell(self._plan)  # shares the arrays; a cell is a faster argument
 
@@ -57,17 +58,20 @@ class ExecutionGroup:
             LockStepError: the error of `failure`, or one that a Python block raises.
         """
         k = 0
-        while not self.finished:
-            self.tick, k, status = run(self._cell, self.tick, k, stop)
-            if status == WAKE_PYTHON:
-                self._plan.next[k] = max(on_tick(self.parts[k], self.tick), self.tick + 1)
-                k += 1
-            elif status == NON_FINITE:
-                raise failure(self.parts[k], self.tick)
-            else:
-                self.finished = status == FINISHED
-                if status == CONTINUE:
-                    return
+        try:
+            while not self.finished:
+                self.tick, k, status = run(self._cell, self.tick, k, stop)
+                if status == WAKE_PYTHON:
+                    self._plan.next[k] = max(on_tick(self.parts[k], self.tick), self.tick + 1)
+                    k += 1
+                elif status == NON_FINITE:
+                    raise failure(self.parts[k], self.tick)
+                else:
+                    self.finished = status == FINISHED
+                    if status == CONTINUE:
+                        return
+        finally:
+            RUNNING[0] = IDLE
 
     def run_past_end(
         self, stop: int, on_tick: Callable[[int, int], int], failure: Callable[[int, int], Exception]
@@ -77,10 +81,6 @@ class ExecutionGroup:
         self.finished = False
         self.advance(stop, on_tick, failure)
         self.finished = True
-
-    def finish(self) -> None:
-        """End after the current tick."""
-        self._plan.ended[0] = 1
 
     def replace(self, part: int, code: BoundBlock) -> None:
         """Replace the machine code of the block `part`."""

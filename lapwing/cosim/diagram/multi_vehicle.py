@@ -7,10 +7,11 @@ the vehicle's name as a prefix. Other modules handle fleets only where they refe
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from lapwing.cosim.config.run_config import PerVehicle, RunConfig, ServiceConfig
-from lapwing.cosim.diagram.block_diagram import BlockDiagram, Service
+from lapwing.cosim.diagram.block_diagram import BlockDiagram, Service, is_connected
 from lapwing.cosim.diagram.compiled_block import Block, BoundBlock
 from lapwing.cosim.diagram.port_rows import RenamedPortRows
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
@@ -52,25 +53,25 @@ def merge_configs(members: Sequence[RunConfig], resolved: Mapping[str, Any]) -> 
     return members[0]._replace(vehicle="", services=services, auxiliary=auxiliary, resolved=dict(resolved))
 
 
-def members(setup: RunConfig) -> tuple[RunConfig, ...]:
+def members(config: RunConfig) -> tuple[RunConfig, ...]:
     """Return the run configuration of each vehicle alone; for a single vehicle, that of the run."""
-    if setup.vehicle:
-        return (setup,)
-    common = {name: table for name, table in setup.resolved.items() if name != "vehicle"}
+    if config.vehicle:
+        return (config,)
+    common = {name: table for name, table in config.resolved.items() if name != "vehicle"}
     return tuple(
-        setup._replace(
+        config._replace(
             vehicle=vehicle,
-            services=_values_of(vehicle, {name: service.parameters for name, service in setup.services.items()}),
-            auxiliary=_values_of(vehicle, setup.auxiliary),
+            services=_values_of(vehicle, {name: service.parameters for name, service in config.services.items()}),
+            auxiliary=_values_of(vehicle, config.auxiliary),
             resolved={**common, **entry},
         )
-        for vehicle, entry in zip(setup.vehicles, setup.resolved["vehicle"], strict=True)
+        for vehicle, entry in zip(config.vehicles, config.resolved["vehicle"], strict=True)
     )
 
 
-def member(setup: RunConfig, vehicle: str) -> RunConfig:
+def member(config: RunConfig, vehicle: str) -> RunConfig:
     """Return the run configuration of one vehicle alone."""
-    return members(setup)[setup.vehicles.index(vehicle)]
+    return members(config)[config.vehicles.index(vehicle)]
 
 
 def _values_of(vehicle: str, services: Mapping[str, PerVehicle]) -> dict[str, Any]:
@@ -81,9 +82,9 @@ def _values_of(vehicle: str, services: Mapping[str, PerVehicle]) -> dict[str, An
     }
 
 
-def primary_topic(setup: RunConfig, topic: Topic) -> Topic:
+def primary_topic(config: RunConfig, topic: Topic) -> Topic:
     """Return the topic of the first vehicle, for displays with room for one vehicle."""
-    return topic if setup.vehicle else of_vehicle(topic, setup.vehicles[0])
+    return topic if config.vehicle else of_vehicle(topic, config.vehicles[0])
 
 
 def merge_services(name: str, services: Sequence[tuple[RunConfig, Service]]) -> Service:
@@ -128,7 +129,7 @@ def _port(vehicle: str, port: Port) -> Port:
 def _part(member: RunConfig, part: Any) -> Any:
     vehicle = member.vehicle
     if not isinstance(part, Block):
-        return (ConnectedVehicleBlock if hasattr(part, "reports") else VehicleBlock)(member, part)
+        return (ConnectedVehicleBlock if is_connected(part) else VehicleBlock)(member, part)
     return replace(
         part,
         name=qualified_name(vehicle, part.name),
@@ -155,9 +156,9 @@ class VehicleBlock:
         self.outputs = tuple(_port(self.vehicle, port) for port in part.outputs)
         self.inputs = tuple(_input(self.vehicle, i) for i in getattr(part, "inputs", ()))
 
-    def bind(self, graph: BlockDiagram) -> None:
+    def bind(self, diagram: BlockDiagram) -> None:
         """Bind the block to the vehicle's view of the diagram."""
-        self._part.bind(VehicleDiagram(graph, self._member))
+        self._part.bind(VehicleDiagram(diagram, self._member))
 
     def on_tick(self, tick: int) -> int:
         """Run the block at `tick`."""
@@ -171,9 +172,9 @@ class VehicleBlock:
 class ConnectedVehicleBlock(VehicleBlock):
     """Python block of a vehicle with a connection to a program outside the run."""
 
-    def open(self, report_wait: Callable[[str], None]) -> None:
-        """Connect."""
-        self._part.open(report_wait)
+    def open(self, report_wait: Callable[[str], None], log: Path | None = None) -> None:
+        """Connect; files of the program have the name of the vehicle."""
+        self._part.open(report_wait, log and log.with_suffix(f".{self.vehicle}.mcap"))
 
     def close(self) -> None:
         """End the connection."""
@@ -188,18 +189,18 @@ class ConnectedVehicleBlock(VehicleBlock):
 class VehicleDiagram(RenamedPortRows):
     """View of a fleet's block diagram for one vehicle, with the names of a run of that vehicle alone."""
 
-    def __init__(self, graph: BlockDiagram, member: RunConfig):
-        super().__init__(graph, partial(qualified_name, member.vehicle))
-        self._graph, self.setup = graph, member
+    def __init__(self, diagram: BlockDiagram, member: RunConfig):
+        super().__init__(diagram, partial(qualified_name, member.vehicle))
+        self._diagram, self.config = diagram, member
 
     def part(self, name: str) -> Block:
         """Return the compiled block of this name."""
-        return self._graph.part(qualified_name(self.setup.vehicle, name))
+        return self._diagram.part(qualified_name(self.config.vehicle, name))
 
     def prepare(self, part: Block) -> BoundBlock:
         """Compile or load a block that replaces another one later."""
-        return self._graph.prepare(part)
+        return self._diagram.prepare(part)
 
     def replace(self, part: Block, code: BoundBlock) -> None:
         """Replace the block of the same name by a prepared one."""
-        self._graph.replace(part, code)
+        self._diagram.replace(part, code)

@@ -48,7 +48,7 @@ class PortRows:
         """Return the value of a port at the last tick up to `tick` at which one was due."""
         period = max(1, self.ports[port].period)
         if port not in self._readers:
-            self._readers[port] = row_unpacker(self.ports[port].like)
+            self._readers[port] = row_unpacker(self.ports[port].example)
         return self._readers[port](self._rows[port][self._index(port, tick - tick % period)])
 
     def put(self, port: str, tick: int, value: Any) -> None:
@@ -107,7 +107,7 @@ class _RenamedItems(dict[str, T]):
 def _ring(port: Port, ticks: int, delay: int, former: np.ndarray | None) -> np.ndarray:
     """Return rows for `ticks` ticks, in the memory of `former` if it has the same shape."""
     rows = 1 if port.period == LATCHED else -(-ticks // port.period) + SPARE
-    shape = 1 << (rows - 1).bit_length(), max(1, row_width(port.like))
+    shape = 1 << (rows - 1).bit_length(), max(1, row_width(port.example))
     if former is None or former.shape != shape:
         return np.zeros(shape)
     former[: SPARE + delay] = former[-SPARE - delay :] = 0.0  # rows of ticks before 0 are read before they are written

@@ -18,7 +18,7 @@ class Port(NamedTuple):
     """Stream of values from one block to others: a tree of numbers every `period` ticks, or LATCHED."""
 
     name: str
-    like: Any  # example value: fixes the shape and the types
+    example: Any  # example value: fixes the shape and the types
     period: int = 1  # [ticks]
 
 

@@ -31,6 +31,8 @@ class TopicEncoder:
         fields: (columns of the port's tree, instants [ns] (n,) of int64) to the message's fields.
         sample: function that returns a message with the texts of a key; the key is () if `texts` is None.
         texts: function that returns the columns of the key, each (n,): indices into the tables of texts.
+        on_change: True for a message also at every tick at which the port's row differs from that before; the port's
+            period is then 1.
     """
 
     topic: Topic
@@ -39,6 +41,19 @@ class TopicEncoder:
     fields: Callable[[Any, np.ndarray], Fields]
     sample: Callable[..., Any]
     texts: Callable[[Any], Sequence[np.ndarray]] | None = None
+    on_change: bool = False
+
+    def message_ticks(self, first: int, stop: int, rows: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Return the ticks of [first, stop) that have a message, (n,) int64.
+
+        `rows` returns the port's rows at ticks from first - 1 on, shape (n, width).
+        """
+        due = due_ticks(first, stop, self.period)
+        if not self.on_change or stop < 2:
+            return due
+        before = max(first - 1, 0)
+        values = rows(np.arange(before, stop))
+        return np.union1d(due, before + 1 + np.flatnonzero((values[1:] != values[:-1]).any(axis=1)))
 
 
 class RecordBatch(NamedTuple):
@@ -62,22 +77,22 @@ def split_at(batches: Iterable[RecordBatch], stop: int) -> tuple[list[RecordBatc
 
 
 def encode(
-    encoder: TopicEncoder, port: Port, setup: RunConfig, ticks: np.ndarray, rows: np.ndarray
+    encoder: TopicEncoder, port: Port, config: RunConfig, ticks: np.ndarray, rows: np.ndarray
 ) -> Iterator[RecordBatch]:
     """Yield the messages of a topic at `ticks` (n,), from the rows (n, width) of its port at these ticks."""
-    tree = columns(port.like, rows)
+    tree = columns(port.example, rows)
     if encoder.texts is None:
-        yield _record_batch(encoder, encoder.sample(), tree, ticks, setup)
+        yield _record_batch(encoder, encoder.sample(), tree, ticks, config)
         return
     keys = np.stack([np.asarray(column, np.int64) for column in encoder.texts(tree)], axis=1)
     for key in np.unique(keys, axis=0):
         selected = np.flatnonzero((keys == key).all(axis=1))
-        part = columns(port.like, rows[selected]) if len(selected) < len(ticks) else tree
-        yield _record_batch(encoder, encoder.sample(*key.tolist()), part, ticks[selected], setup)
+        part = columns(port.example, rows[selected]) if len(selected) < len(ticks) else tree
+        yield _record_batch(encoder, encoder.sample(*key.tolist()), part, ticks[selected], config)
 
 
-def _record_batch(encoder: TopicEncoder, sample: Any, tree: Any, ticks: np.ndarray, setup: RunConfig) -> RecordBatch:
-    fields = encoder.fields(tree, ticks * setup.interval_ns)
+def _record_batch(encoder: TopicEncoder, sample: Any, tree: Any, ticks: np.ndarray, config: RunConfig) -> RecordBatch:
+    fields = encoder.fields(tree, ticks * config.interval_ns)
     return RecordBatch(encoder.topic, ticks, Record.of(sample).encode(len(ticks), fields))
 
 

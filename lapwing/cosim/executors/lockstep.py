@@ -1,22 +1,33 @@
 """Lock step of a process: wait for the inputs that are due, step, publish."""
 
 import json
+import math
 import os
 import time
 from contextlib import suppress
+from pathlib import Path
 
 from lapwing.cosim.diagram.block_diagram import BlockDiagram, ExternalBlock, Service
 from lapwing.cosim.executors import realtime
 from lapwing.cosim.executors.deadlines import Deadlines
 from lapwing.cosim.executors.log_backpressure import LogBackpressure
 from lapwing.cosim.executors.participant import Participant, Stopped
+from lapwing.cosim.processes.watchdog import SERVICE_LIMIT, Watchdog
 from lapwing.cosim.run_errors import CutShortError, DivergedError
-from lapwing.cosim.transport.bus_keys import DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY, REPORTS_KEY
-from lapwing.cosim.transport.packet_exchange import PAGE, EndOfRun, PacketReceiver, PacketSender, packet_receivers
+from lapwing.cosim.transport.bus_keys import BLOCK_TIME_KEY, DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY, REPORTS_KEY
+from lapwing.cosim.transport.packet_exchange import (
+    PACKET_TICKS,
+    EndOfRun,
+    PacketReceiver,
+    PacketSender,
+    packet_receivers,
+)
 from lapwing.cosim.transport.packet_schedule import ticks_per_packet
 
 
-def run_lockstep(process: Participant, service: Service, owns_time: bool, recorder: str) -> None:
+def run_lockstep(
+    process: Participant, service: Service, owns_time: bool, recorder: str, log: Path | None = None
+) -> None:
     """Step `service` from tick 0 to the last tick of the run.
 
     An empty step packet is the last one of a service. The clock owner also publishes whether the run was completed.
@@ -26,16 +37,17 @@ def run_lockstep(process: Participant, service: Service, owns_time: bool, record
         service: service to step.
         owns_time: True if this process sets the pace and decides which tick is the last.
         recorder: the participant for whose log the clock owner waits.
+        log: path of the log on this machine, if it is known: files of connected programs are kept beside it.
 
     Raises:
         Stopped: this process was requested to end.
         LockStepError: a message is missing or out of order, a state is invalid, or another participant ended early.
     """
-    setup = process.setup
-    graph = BlockDiagram(setup, [service], 2 * PAGE)
-    graph.advance(0)  # steps no block, but compiles the loop over the blocks before the clock starts
-    receivers = packet_receivers(process, graph)
-    sender = PacketSender(process, service, graph)
+    config = process.config
+    diagram = BlockDiagram(config, [service], 2 * PACKET_TICKS)
+    diagram.advance(0)  # steps no block, but compiles the loop over the blocks before the clock starts
+    receivers = packet_receivers(process, diagram)
+    sender = PacketSender(process, service, diagram)
     backpressure = LogBackpressure(process, recorder) if owns_time else None
 
     def report_wait(text: str) -> None:
@@ -44,22 +56,23 @@ def run_lockstep(process: Participant, service: Service, owns_time: bool, record
         process.report_external_wait(text)
 
     try:
-        graph.open(report_wait)
-        _run(process, graph, receivers, sender, owns_time, backpressure)
+        with Watchdog(SERVICE_LIMIT, math.inf):
+            diagram.open(report_wait, log)
+            _run(process, diagram, receivers, sender, owns_time, backpressure)
     finally:
-        graph.close()
+        diagram.close()
 
 
 def _run(
     process: Participant,
-    graph: BlockDiagram,
+    diagram: BlockDiagram,
     receivers: list[PacketReceiver],
     sender: PacketSender,
     owns_time: bool,
     backpressure: LogBackpressure | None,
 ) -> None:
     """Join the other participants, and step from tick 0 to the last tick of the run."""
-    setup = process.setup
+    config = process.config
     process.join()
     sender.refresh_subscribers()
     if process.core is not None:
@@ -68,25 +81,27 @@ def _run(
             batch()
     if process.realtime:
         realtime.enter()
-    tick_duration = setup.interval / process.speed if process.speed is not None else None
-    ticks_per_call = ticks_per_packet(setup, process.name) if process.packs_ticks else 1
-    deadlines = Deadlines()
+    tick_duration = config.interval / process.speed if process.speed is not None else None
+    ticks_per_call = ticks_per_packet(config, process.name) if process.packs_ticks else 1
+    deadlines, block_time = Deadlines(), 0.0
     started = time.perf_counter()
     try:
-        while not graph.ended:
+        while not diagram.ended:
             if process.stopping:
                 raise Stopped
-            tick = graph.tick
+            tick = diagram.tick
             stop = min([receiver.receive(tick) for receiver in receivers], default=tick + 1)
             if backpressure:
                 backpressure.wait_for_log(tick)
             if tick_duration is not None and owns_time:
                 deadlines.note(_pace(started + tick * tick_duration))
             step_start = time.perf_counter()
-            graph.advance(min(stop, tick + ticks_per_call))
-            sender.publish(tick, graph.tick)
+            cpu_start = time.thread_time()
+            diagram.advance(min(stop, tick + ticks_per_call))
+            block_time += time.thread_time() - cpu_start
+            sender.publish(tick, diagram.tick)
             if tick_duration is not None and not owns_time:
-                deadlines.note(time.perf_counter() - step_start - tick_duration * (graph.tick - tick))
+                deadlines.note(time.perf_counter() - step_start - tick_duration * (diagram.tick - tick))
         if owns_time:
             process.publish_final_status(ENDED_KEY)
     except EndOfRun as end:
@@ -103,9 +118,10 @@ def _run(
     finally:
         if tick_duration is not None:
             process.publish_final_status(DEADLINES_KEY, deadlines.to_text())
-        if reports := graph.reports:
+        process.publish_final_status(BLOCK_TIME_KEY, f"{block_time:.6f}")
+        if reports := diagram.reports:
             process.publish_final_status(REPORTS_KEY, json.dumps(reports))
-        _leave(process, sender, graph.tick)
+        _leave(process, sender, diagram.tick)
 
 
 def _leave(process: Participant, sender: PacketSender, stop: int) -> None:
@@ -126,23 +142,23 @@ def run_encoder(process: Participant, service: Service) -> None:
         Stopped: this process was requested to end.
         LockStepError: a step packet is missing or out of order.
     """
-    ports = process.setup.services[service.name].ports
+    ports = process.config.services[service.name].ports
     external = Service(service.name, [ExternalBlock(service.name, *ports)], service.encoders)
-    graph = BlockDiagram(process.setup, [external], 2 * PAGE)
-    receiver = PacketReceiver(process, service.name, [(port.name, port.period, 0) for port in ports], graph)
-    sender = PacketSender(process, external, graph, publishes_steps=False)
+    diagram = BlockDiagram(process.config, [external], 2 * PACKET_TICKS)
+    receiver = PacketReceiver(process, service.name, [(port.name, port.period, 0) for port in ports], diagram)
+    sender = PacketSender(process, external, diagram, publishes_steps=False)
     process.join()
     sender.refresh_subscribers()
     try:
         while not process.stopping:
-            tick = graph.tick
+            tick = diagram.tick
             receiver.receive(tick)
-            graph.advance(tick + 1)
+            diagram.advance(tick + 1)
             sender.publish(tick, tick + 1)
     except EndOfRun:
         return
     finally:
-        _leave(process, sender, graph.tick)
+        _leave(process, sender, diagram.tick)
     raise Stopped
 
 

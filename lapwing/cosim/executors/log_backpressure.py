@@ -47,7 +47,7 @@ class LogBackpressure:
         self._process = process
         self._get = process.bus.receive(process.participants.senders(RECORDED_KEY, [recorder])).get
         self._recorded: int | None = None
-        self._ahead = max(LEAST, AHEAD // len(process.setup.vehicles))
+        self._ahead = max(LEAST, AHEAD // len(process.config.vehicles))
 
     def wait_for_log(self, tick: int) -> None:
         """Wait until `tick` may be stepped.

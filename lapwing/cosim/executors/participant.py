@@ -15,10 +15,10 @@ from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import (
     ALIVE_KEY,
     COMPILING_KEY,
+    CONFIG_KEY,
     HEARD_KEY,
     OUTSIDE_KEY,
     REFUSED_KEY,
-    SETUP_KEY,
     WAITING_KEY,
 )
 from lapwing.cosim.transport.session_settings import LEASE_MS, limit_silence
@@ -48,7 +48,7 @@ class Participant(StopRequest):
     def __init__(
         self,
         name: str,
-        setup: RunConfig,
+        config: RunConfig,
         bus: ZenohBus,
         participants: PublisherIds,
         others: list[str],
@@ -61,7 +61,7 @@ class Participant(StopRequest):
 
         Args:
             name: unique in the run.
-            setup: run configuration.
+            config: run configuration.
             bus: session.
             participants: publisher GIDs of the run.
             others: participants without which the run cannot begin.
@@ -72,7 +72,7 @@ class Participant(StopRequest):
         """
         super().__init__()
         self.compares, self.realtime = compares, realtime
-        self.name, self.setup, self.bus = name, setup, bus
+        self.name, self.config, self.bus = name, config, bus
         self.participants, self.key_prefix = participants, participants.key_prefix
         self.others, self.speed, self.core = others, speed, core
         self.create_service: Callable[[str], Service]  # returns a service by name, for its topics
@@ -94,7 +94,7 @@ class Participant(StopRequest):
 
     def key(self, topic: Topic) -> str:
         """Return the Zenoh key of a topic in this run."""
-        return topic.zenoh_key(self.setup.vehicle, self.key_prefix)
+        return topic.zenoh_key(self.config.vehicle, self.key_prefix)
 
     def _report_compiling(self, _: str) -> None:
         if not self._compiling:
@@ -139,7 +139,7 @@ class Participant(StopRequest):
             ValueError: another participant has another run configuration; names the first difference.
         """
         self._peers.watch(self.bus, self.key_prefix)  # before its own declaration: others may leave soon after it
-        self.bus.answer(f"{self.key_prefix}/{SETUP_KEY}/{self.name}", compress(self.setup))
+        self.bus.answer(f"{self.key_prefix}/{CONFIG_KEY}/{self.name}", compress(self.config))
         self.bus.declare_liveliness(f"{self.key_prefix}/{ALIVE_KEY}/{self.name}")
         self._await(self.others, on_wait)
         limit_silence(LEASE_MS)
@@ -158,15 +158,15 @@ class Participant(StopRequest):
 
     def _compare(self) -> None:
         """Raise ValueError if another participant has another run configuration."""
-        own = to_json(self.setup)
+        own = to_json(self.config)
         for other in self.compares:
             if other == self.name:
                 continue
-            reply = self.bus.query(f"{self.key_prefix}/{SETUP_KEY}/{other}", ANSWER_TIMEOUT)
+            reply = self.bus.query(f"{self.key_prefix}/{CONFIG_KEY}/{other}", ANSWER_TIMEOUT)
             try:
                 if reply is None or (text := decompress(reply)) == own:
                     continue
-                difference = first_difference(self.setup, from_json(text, self.setup.modules))
+                difference = first_difference(self.config, from_json(text, self.config.modules))
             except ValueError as error:
                 raise ValueError(f"{self.name}: run configuration of {other} cannot be read: {error}") from None
             key, own_value, other_value = difference or ("run configuration", "?", "?")

@@ -6,22 +6,22 @@ from collections.abc import Callable
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.log.log_sequencer import Recording
 
-PAGE = 1000  # ticks
+KEPT_TICKS = 1000  # ticks
 PACED = 0.05  # [s] of wall time in a block of a run with a real-time factor
 OBSERVE_PERIOD = 0.2  # [s] of wall time between two calls of `observe`
 
 
 def run_single(
-    graph: BlockDiagram,
+    diagram: BlockDiagram,
     recording: Recording | None,
     speed: float | None = None,
-    observe: Callable[[BlockDiagram], bool] = lambda graph: False,
+    observe: Callable[[BlockDiagram], bool] = lambda diagram: False,
     last: int | None = None,
 ) -> None:
     """Run a scene to its end.
 
     Args:
-        graph: all services of the run, at tick 0, with rows for `PAGE` ticks.
+        diagram: all services of the run, at tick 0, with rows for `KEPT_TICKS` ticks.
         recording: receives the messages; None without a log.
         speed: simulated seconds per second; None for as fast as possible.
         observe: called every `OBSERVE_PERIOD`; the run stops when it returns True.
@@ -30,25 +30,25 @@ def run_single(
     Raises:
         LockStepError: a state is invalid; all earlier ticks are recorded.
     """
-    setup = graph.setup
-    page = PAGE if speed is None else max(1, min(PAGE, round(PACED * speed / setup.interval)))
-    end = setup.last_tick + 1 if last is None else last + 1
+    config = diagram.config
+    kept_ticks = KEPT_TICKS if speed is None else max(1, min(KEPT_TICKS, round(PACED * speed / config.interval)))
+    end = config.last_tick + 1 if last is None else last + 1
     started = next_observation = time.perf_counter()
     recorded = 0
     try:
-        while not graph.ended and graph.tick < end:
+        while not diagram.ended and diagram.tick < end:
             if speed is not None:
-                time.sleep(max(0.0, started + graph.tick * setup.interval / speed - time.perf_counter()))
-            graph.advance(min(graph.tick + page, end))
+                time.sleep(max(0.0, started + diagram.tick * config.interval / speed - time.perf_counter()))
+            diagram.advance(min(diagram.tick + kept_ticks, end))
             if recording:
-                recording.write(graph.record_batches(recorded, graph.tick), graph.tick - 1)
-            recorded = graph.tick
+                recording.write(diagram.record_batches(recorded, diagram.tick), diagram.tick - 1)
+            recorded = diagram.tick
             if time.perf_counter() >= next_observation:
                 next_observation += OBSERVE_PERIOD
-                if observe(graph):
+                if observe(diagram):
                     return
-        observe(graph)
+        observe(diagram)
     finally:
         if recording:
-            recording.write(graph.record_batches(recorded, graph.tick), graph.tick - 1)
+            recording.write(diagram.record_batches(recorded, diagram.tick), diagram.tick - 1)
             recording.finish()

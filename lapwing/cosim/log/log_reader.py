@@ -1,4 +1,4 @@
-"""Reader of logs, including truncated ones."""
+"""Reader of logs, including truncated ones and those of other versions, whose message types it compares."""
 
 from bisect import bisect_left
 from collections.abc import Iterable, Iterator
@@ -8,15 +8,72 @@ from typing import Self
 
 import numpy as np
 
-from lapwing.cosim.config.former_names import present_metadata
 from lapwing.cosim.config.provenance import package_version
 from lapwing.cosim.log.mcap_contents import Contents
 from lapwing.cosim.log.mcap_writer import DETERMINISTIC
 from lapwing.dynamics.input_file import check_regular, unreadable
 from lapwing.messages import message_class
 from lapwing.messages.digest import Digest
+from lapwing.messages.parse import PRIMITIVES, Definition, parse
 from lapwing.messages.topic_columns import ColumnBuilder, TopicColumns
-from lapwing.messages.type_compatibility import first_type_difference
+from lapwing.messages.types import DEFINITIONS, TYPES
+
+_BAR = "=" * 80  # between the types of a schema, as in ROS 2
+_HEAD = "MSG: "
+
+
+def first_type_difference(type_name: str, text: str) -> str:
+    """Return the first difference between a recorded and the current definition as text; "" if both are compatible.
+
+    Comments, constants and defaults are not part of a message. An unknown type has no difference.
+
+    Args:
+        type_name: full name, "sensor_msgs/msg/Imu".
+        text: recorded definition, in the schema encoding `ros2msg`.
+    """
+    if type_name not in TYPES or not text.strip() or text == TYPES[type_name].schema_text:
+        return ""
+    try:
+        recorded = _fields(type_name, _definitions(type_name, text))
+    except (ValueError, LookupError):
+        return "has a definition that cannot be read"
+    current = _fields(type_name, DEFINITIONS)
+    for current_field, recorded_field in zip([*current, ("", "")], [*recorded, ("", "")], strict=False):
+        if current_field != recorded_field:
+            expected, result = (
+                " ".join(field).strip() or "no more fields" for field in (current_field, recorded_field)
+            )
+            return f"has {result} where this version has {expected}"
+    return ""
+
+
+def _definitions(type_name: str, text: str) -> dict[str, Definition]:
+    """Return the types of a schema by full name."""
+    result = {}
+    for k, part in enumerate(text.replace("\r", "").split(f"{_BAR}\n")):
+        name, content = type_name, part
+        if k:
+            head, _, content = part.partition("\n")
+            package, _, short = head.removeprefix(_HEAD).strip().partition("/")
+            name = f"{package}/msg/{short.removeprefix('msg/')}"
+        result[name] = parse(name, content)
+    return result
+
+
+def _fields(type_name: str, definitions: dict[str, Definition], prefix: str = "") -> list[tuple[str, str]]:
+    """Return type and dotted name of all leaf fields of a type; types with equal layouts count as one."""
+    result = []
+    for field in definitions[type_name].fields:
+        array = "" if field.length is None else f"[{field.length or ''}]"
+        if field.nested:
+            result += _fields(field.base, definitions, f"{prefix}{field.name}{array}.")
+        else:
+            result.append((_NAMES.get(PRIMITIVES.get(field.base, ""), field.base) + array, f"{prefix}{field.name}"))
+    return result
+
+
+_NAMES = {layout: name for name, layout in PRIMITIVES.items() if name not in ("byte", "char")}
+
 
 _FOREVER = 1 << 64
 _time, _place = itemgetter(0), itemgetter(0, 1)
@@ -27,7 +84,6 @@ class LogReader:
 
     Attributes:
         metadata: content of the records `lapwing` and `lapwing_end`; empty for logs of other tools.
-        recorded_names: name of each topic in the file by its current name.
         attachments: contents by file name.
         complete: False if the file has no end (its writer was killed); it then ends with its last complete chunk.
         damaged: a line for each damaged chunk; with `skip_damaged` only.
@@ -50,8 +106,7 @@ class LogReader:
         except BaseException:
             self._file.close()
             raise
-        self.metadata, self.recorded_names = present_metadata(self._contents.metadata), self._contents.recorded_names
-        self.attachments = self._contents.attachments
+        self.metadata, self.attachments = self._contents.metadata, self._contents.attachments
         self.complete, self.damaged = self._contents.complete, self._contents.damaged
 
     def topics(self) -> dict[str, str]:
@@ -157,15 +212,11 @@ class LogReader:
         """Return the topics that are part of the digest."""
         return {c.topic for c in self._contents.channels.values() if c.metadata.get(DETERMINISTIC) != "false"}
 
-    def digest(self, current_names: bool = False) -> str:
-        """Compute the digest of the deterministic messages; that of an intact log equals `metadata["digest"]`.
-
-        Args:
-            current_names: name the topics as this version does, to compare with a run of this version.
-        """
-        digest, recorded = Digest(), self.recorded_names
+    def digest(self) -> str:
+        """Compute the digest of the deterministic messages; that of an intact log equals `metadata["digest"]`."""
+        digest = Digest()
         for topic, _, time_ns, payload in self.messages(self.deterministic_topics()):
-            digest.update(topic if current_names else recorded[topic], time_ns, payload)
+            digest.update(topic, time_ns, payload)
         return digest.hexdigest()
 
     def close(self) -> None:

@@ -9,68 +9,62 @@ from lapwing.cosim.log import LogWriter
 from lapwing.messages import WallTime, header
 from lapwing.messages.topics import TOPICS, WALL_TIME, Topic, topic_rank
 
-CHUNK = 1000  # [ticks] of one vehicle; fewer with several vehicles, so that a chunk stays in the processor's cache
-SHORTEST = 250  # ticks
-FLUSH_PERIOD = 0.25  # [s] of wall time between two writes of an incomplete chunk; log packets take 0.1 s more
-FLUSH_RATIO = 10.0  # smallest ratio of this period to the time of such a write, which repeats the chunk's beginning
+CHUNK = 1000  # [ticks] limit for one vehicle; less with several vehicles: a chunk stays in the processor's cache
+SHORTEST = 250  # [ticks] smallest limit
+FLUSH_PERIOD = 0.25  # [s] of wall time after which a chunk is written earlier; log packets take 0.1 s more
 
 
-def chunk(setup: RunConfig) -> int:
-    """Return the ticks of a chunk. Chunks begin at multiples of it, so the file does not depend on packet timing."""
-    return max(SHORTEST, CHUNK // len(setup.vehicles))
+def chunk(config: RunConfig) -> int:
+    """Return the largest number of ticks in a chunk."""
+    return max(SHORTEST, CHUNK // len(config.vehicles))
 
 
 class Recording:
     """Writes record batches, and the wall time with every chunk. Call `finish` after the last batch."""
 
-    def __init__(self, writer: LogWriter, setup: RunConfig):
-        """Record the messages of the run `setup` with `writer`."""
-        self._writer, self._setup = writer, setup
-        self._started = time.monotonic()
-        self._flushed = self._started
-        self._tail_took = 0.0  # [s] of this thread for the newest tail
+    def __init__(self, writer: LogWriter, config: RunConfig):
+        """Record the messages of the run `config` with `writer`."""
+        self._writer, self._config = writer, config
+        self._started = self._flushed = time.monotonic()
         self._waiting: list[RecordBatch] = []  # batches of the incomplete chunk
-        self._chunk = chunk(setup)
-        self._cut = self._chunk  # tick at which the chunk ends
+        self._chunk = chunk(config)
+        self._cut = self._chunk  # tick at which the chunk ends at the latest
         self.newest: dict[Topic, bytes] = {}
         self.time_ns = 0
         self._write_wall_time(0)
 
-    def write(self, pages: Iterable[RecordBatch], last: int) -> None:
+    def write(self, batches: Iterable[RecordBatch], last: int) -> None:
         """Write all messages of some ticks, up to the tick `last`."""
-        for page in pages:
-            self._waiting.append(page)
-            self.newest[page.topic] = page.payloads[-1].tobytes()
-        self.time_ns = max(last, 0) * self._setup.interval_ns
+        for batch in batches:
+            self._waiting.append(batch)
+            self.newest[batch.topic] = batch.payloads[-1].tobytes()
+        self.time_ns = max(last, 0) * self._config.interval_ns
         while last + 1 >= self._cut:
-            self._write_chunk()
-        now = time.monotonic()
-        if now - self._flushed >= max(FLUSH_PERIOD, FLUSH_RATIO * (self._tail_took + self._writer.tail_took)):
-            self._writer.write_tail(self._parts(self._waiting))
-            self._flushed = time.monotonic()
-            self._tail_took = self._flushed - now
+            self._write_chunk(self._cut)
+        if self._waiting and time.monotonic() - self._flushed >= FLUSH_PERIOD:
+            self._write_chunk(last + 1)
 
     def finish(self) -> None:
         """Write the last chunk."""
-        self._write_chunk()
+        self._write_chunk(self._cut)
 
-    def _write_chunk(self) -> None:
-        """Write the messages of the ticks before the cut, and the wall time."""
-        complete, self._waiting = split_at(self._waiting, self._cut)
+    def _write_chunk(self, stop: int) -> None:
+        """Write the messages of the ticks before `stop`, and the wall time."""
+        complete, self._waiting = split_at(self._waiting, stop)
         if complete:
-            self._writer.write_page(self._parts(complete))
+            self._writer.write_batch(self._parts(complete))
             self._flushed = time.monotonic()
-        self._write_wall_time(min(self.time_ns, (self._cut - 1) * self._setup.interval_ns))
-        self._cut += self._chunk
+        self._write_wall_time(min(self.time_ns, (stop - 1) * self._config.interval_ns))
+        self._cut = stop + self._chunk
 
-    def _parts(self, pages: list[RecordBatch]) -> list[tuple]:
-        interval, vehicles = self._setup.interval_ns, self._setup.vehicles
+    def _parts(self, batches: list[RecordBatch]) -> list[tuple]:
+        interval, vehicles = self._config.interval_ns, self._config.vehicles
         parts = []
-        for page in sorted(pages, key=lambda page: topic_rank(page.topic)):  # independent of the order of arrival
-            vehicle = vehicles.index(page.topic.vehicle) if page.topic.vehicle else 0
-            order = (page.ticks * (len(TOPICS) + 1) + topic_rank(page.topic)) * len(vehicles) + vehicle
-            name = page.topic.key(self._setup.vehicle)
-            parts.append((name, page.topic.message, page.ticks * interval, page.payloads, order))
+        for batch in sorted(batches, key=lambda batch: topic_rank(batch.topic)):  # independent of the order of arrival
+            vehicle = vehicles.index(batch.topic.vehicle) if batch.topic.vehicle else 0
+            order = (batch.ticks * (len(TOPICS) + 1) + topic_rank(batch.topic)) * len(vehicles) + vehicle
+            name = batch.topic.key(self._config.vehicle)
+            parts.append((name, batch.topic.message, batch.ticks * interval, batch.payloads, order))
         return parts
 
     def _write_wall_time(self, time_ns: int) -> None:

@@ -39,7 +39,7 @@ class LogWriter:
 
     Raises:
         ValueError: another process is writing the file, or it cannot be written (then also from `write`,
-            `write_page`, `flush` and `close`).
+            `write_batch`, `flush` and `close`).
     """
 
     def __init__(
@@ -55,7 +55,6 @@ class LogWriter:
         self._on_wait = on_wait
         self._failed = False  # a chunk could not be written
         self.waited = 0.0  # [s] for previous chunks to be written
-        self.tail_took = 0.0  # [s] to write the newest tail
         self._digest = Digest()
         self._topics: dict[str, WrittenTopic] = {}
         self._schemas: dict[str, int] = {}
@@ -99,7 +98,7 @@ class LogWriter:
         if self._size >= CHUNK_SIZE or time.monotonic() >= self._due:
             self._cut()
 
-    def write_page(self, parts: Iterable[Part]) -> None:
+    def write_batch(self, parts: Iterable[Part]) -> None:
         """Record messages of the digest as one chunk, in ascending order over all parts.
 
         A topic has several parts if its messages differ in size; for equal orders, the earlier part is first. The
@@ -109,14 +108,8 @@ class LogWriter:
             ValueError: arrays of different lengths, payloads of another type, shape or layout, or a negative time.
         """
         self._cut()
-        if page := [part for part in (self._rows(*part) for part in parts) if len(part.order)]:
-            self._submit(lambda declarations: self._write_chunk(declarations, page))
-
-    def write_tail(self, parts: Iterable[Part]) -> None:
-        """Write the beginning of the next page, which the next write replaces. See `write_page`."""
-        self._cut()
-        if page := [part for part in (self._rows(*part) for part in parts) if len(part.order)]:
-            self._submit(lambda declarations: self._write_tail(declarations, page), keep=True)
+        if batch := [part for part in (self._rows(*part) for part in parts) if len(part.order)]:
+            self._submit(lambda declarations: self._write_chunk(declarations, batch))
 
     def flush(self) -> None:
         """Write all recorded messages to the file. `write` does it every 0.5 s; call this if no message follows."""
@@ -210,15 +203,13 @@ class LogWriter:
         if entries:
             self._submit(lambda declarations: self._write_chunk(declarations, rows_of(entries)))
 
-    def _submit(self, job: Callable[[list[Schema | Channel]], None], keep: bool = False) -> None:
-        """Submit a chunk to the worker after the previous one is written. `keep` declares its topics again later."""
+    def _submit(self, job: Callable[[list[Schema | Channel]], None]) -> None:
+        """Submit a chunk to the worker after the previous one is written."""
         if self._failed:
             raise ValueError(f"{self.path}: {self.metadata['failure']}")
-        declarations = self._declarations
-        if not keep:
-            self._declarations = []
+        declarations, self._declarations = self._declarations, []
         self._wait()
-        self._pending = self._worker.submit(job, list(declarations))
+        self._pending = self._worker.submit(job, declarations)
 
     def _wait(self) -> None:
         pending, self._pending = self._pending, None
@@ -233,14 +224,6 @@ class LogWriter:
                 self.metadata["failure"] = _failure(error)
                 raise self._error(error) from None
             self.waited += time.perf_counter() - started
-
-    def _write_tail(self, declarations: list[Schema | Channel], parts: list[Rows]) -> None:
-        start = time.monotonic()
-        counts = {part.topic: part.topic.count for part in parts}
-        self._container.write_provisional_chunk(declarations, arrange(parts))
-        for topic, count in counts.items():  # its messages will be written again
-            topic.count = count
-        self.tail_took = time.monotonic() - start
 
     def _write_chunk(self, declarations: list[Schema | Channel], parts: list[Rows]) -> None:
         self._container.add_chunk(declarations, arrange(parts))

@@ -17,7 +17,6 @@ from mcap.stream_reader import get_chunk_data_stream
 from mcap.writer import MCAP0_MAGIC
 
 from lapwing.cosim.log.mcap_writer import METADATA, METADATA_END
-from lapwing.messages.former_names import current_topic, current_type
 
 _RECORD = struct.Struct("<BQ")  # opcode, length of the remaining record
 _MESSAGE = struct.Struct("<HIQQ")  # channel, sequence, log time, publish time; then the payload
@@ -67,8 +66,7 @@ class Contents:
         attachments: contents by file name.
         schemas: type name by schema id.
         definitions: text of the type by schema id, for ROS 2 encodings.
-        channels: channels by id, with the current names of the topics.
-        recorded_names: former or current name of each topic, as in the file, by its current name.
+        channels: channels by id.
         chunks: in order of the file.
         complete: True if the file has its end.
         damaged: a line for each damaged chunk, with `skip_damaged` only.
@@ -83,7 +81,6 @@ class Contents:
         self.schemas: dict[int, str] = {}
         self.definitions: dict[int, str] = {}
         self.channels: dict[int, records.Channel] = {}
-        self.recorded_names: dict[str, str] = {}
         self.chunks: list[ChunkInfo] = []
         self.complete = False
         self.damaged: tuple[str, ...] = ()
@@ -177,13 +174,11 @@ class Contents:
         except (McapError, struct.error, UnicodeDecodeError, OverflowError, MemoryError) as fault:
             raise ValueError(f"{self._path}: damaged {Opcode(opcode).name.lower()} record: {fault}") from None
         if isinstance(record, records.Schema):
-            self.schemas[record.id] = current_type(record.name)
+            self.schemas[record.id] = record.name
             if record.encoding == ROS2:
                 self.definitions[record.id] = record.data.decode(errors="replace")
         elif isinstance(record, records.Channel):
             self.schemas.setdefault(record.schema_id, "")
-            name = current_topic(record.topic, self.schemas[record.schema_id])
-            self.recorded_names[name], record.topic = record.topic, name
             self.channels[record.id] = record
         elif isinstance(record, records.Attachment):
             self.attachments[record.name] = record.data

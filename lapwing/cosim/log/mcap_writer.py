@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from io import FileIO
 from pathlib import Path
-from typing import NamedTuple, Self
+from typing import Self
 
 import zstandard
 from mcap.data_stream import RecordBuilder
@@ -30,8 +30,7 @@ from mcap.records import (
 from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
 
-from lapwing.cosim.log.chunk import Messages
-from lapwing.cosim.log.chunk_indexes import ChunkIndexes, Extent
+from lapwing.cosim.log.chunk import ChunkIndexes, Messages
 
 METADATA = "lapwing"  # name of the metadata record at the start
 METADATA_END = "lapwing_end"  # name of the metadata record at the end, with entries that were not known at the start
@@ -39,16 +38,6 @@ DETERMINISTIC = "deterministic"  # key in a channel's metadata: "true" or "false
 COMPRESSION_LEVEL = 2  # zstd: the default level 3 gives larger logs; level 9 saves 3 % for five times the work
 SMALL = 1024  # [bytes] size below which messages are not compressed
 _CRC = 4  # [bytes] size of the footer's checksum, which does not cover these bytes
-
-
-class _State(NamedTuple):
-    """State of a file before its provisional last chunk."""
-
-    offset: int  # [bytes]
-    schemas: int
-    channels: int
-    chunks: Extent
-    counts: dict[int, int]
 
 
 class Container:
@@ -84,8 +73,6 @@ class Container:
         self._attachments: list[AttachmentIndex] = []
         self._metadata: list[MetadataIndex] = []
         self._counts: dict[int, int] = {}  # messages by channel
-        self._before_tail: _State | None = None
-        self._length = 0  # [bytes] of the file, with a tail that is no longer valid
 
     def add_attachment(self, name: str, data: bytes) -> None:
         """Write an attachment; its media type follows from the file name."""
@@ -106,17 +93,9 @@ class Container:
 
     def add_metadata(self, name: str, metadata: dict[str, str]) -> None:
         """Write a metadata record."""
-        self._drop_tail()
         record = encode(Metadata(metadata=metadata, name=name))
         self._metadata.append(MetadataIndex(length=len(record), name=name, offset=self._offset))
         self._write(record)
-
-    def write_provisional_chunk(self, declarations: list[Schema | Channel], messages: Messages) -> None:
-        """Write a chunk that the next record replaces, so that readers find its messages until then."""
-        self._drop_tail()
-        before = _State(self._offset, len(self._schemas), len(self._channels), self._chunks.extent, self._counts.copy())
-        self.add_chunk(declarations, messages)
-        self._before_tail = before
 
     def add_chunk(self, declarations: list[Schema | Channel], messages: Messages) -> None:
         """Write a compressed chunk with the index of its messages.
@@ -125,7 +104,6 @@ class Container:
             declarations: schemas and channels that no earlier chunk has declared; they are written into this one.
             messages: at least one message.
         """
-        self._drop_tail()
         head = b"".join(map(encode, declarations))
         data = head + messages.data
         is_small = len(messages.data) < SMALL
@@ -169,11 +147,9 @@ class Container:
         self._channels += [record for record in declarations if isinstance(record, Channel)]
         for entry in messages.indexes:
             self._counts[entry.channel_id] = self._counts.get(entry.channel_id, 0) + len(entry.times_ns)
-        self._cut()
 
     def finish(self) -> None:
         """Write the summary and the end."""
-        self._drop_tail()
         self._write(encode(DataEnd(data_section_crc=0)))
         start = self._offset
         groups = [
@@ -195,7 +171,6 @@ class Container:
         summary += offsets
         footer.summary_crc = zlib.crc32(summary + encode(footer)[:-_CRC])
         self._write(summary + encode(footer) + MCAP0_MAGIC)
-        self._cut()
 
     def close(self) -> None:
         """Delete the index of the records."""
@@ -214,23 +189,6 @@ class Container:
             metadata_count=len(self._metadata),
             schema_count=len(self._schemas),
         )
-
-    def _drop_tail(self) -> None:
-        """Seek to the start of the provisional chunk, which stays readable until it is overwritten."""
-        state, self._before_tail = self._before_tail, None
-        if state is None:
-            return
-        self._length = max(self._length, self._offset)
-        self._file.seek(state.offset)
-        self._offset, self._counts = state.offset, state.counts
-        self._chunks.extent = state.chunks
-        del self._schemas[state.schemas :], self._channels[state.channels :]
-
-    def _cut(self) -> None:
-        """Truncate the file after the newest record."""
-        if self._length > self._offset:
-            self._file.truncate()
-        self._length = 0
 
     def _write(self, data: bytes) -> None:
         """Write all data or none: a file on a full disk ends with its last complete record."""

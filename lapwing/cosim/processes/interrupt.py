@@ -2,19 +2,23 @@
 
 import signal
 import sys
+from collections.abc import Callable
 from contextlib import suppress
 from signal import SIGHUP, SIGINT, SIGTERM
 
+from lapwing.cosim.processes.patience import Patience
+
 # nohup ignores SIGHUP, which a closed terminal sends
 ENDING = (SIGINT, SIGTERM) if signal.getsignal(SIGHUP) == signal.SIG_IGN else (SIGINT, SIGTERM, SIGHUP)
+BLOCK_LIMIT = 1.0  # [s] from a signal until the Python block that still runs is interrupted
 REPEAT_DELAY = 0.5  # [s] until an interrupt that was lost in compiled code is raised again
 
 
 class Interrupted(BaseException):
     """The user ended the program by `signal`. Like KeyboardInterrupt, it is not an Exception."""
 
-    def __init__(self, number: int):
-        super().__init__(f"ended by {signal.Signals(number).name}")
+    def __init__(self, number: int, detail: str = ""):
+        super().__init__("; ".join(filter(None, [f"ended by {signal.Signals(number).name}", detail])))
         self.signal = number
 
 
@@ -30,26 +34,48 @@ def interrupt_behind(error: BaseException) -> Interrupted | None:
 
 
 class Stop:
-    """Context in which the signals of `ENDING` are stored instead of raised."""
+    """Context in which the signals of `ENDING` are stored instead of raised.
 
-    def __init__(self) -> None:
+    Attributes:
+        number: the signal that was received, None before.
+        detail: what did not end by itself, "" if nothing.
+    """
+
+    def __init__(self, running: Callable[[], str] = lambda: "") -> None:
+        """Prepare the context.
+
+        Args:
+            running: returns the name of the Python block that runs, "" if none does. A block that still runs after
+                `BLOCK_LIMIT` is interrupted by `Interrupted`, so that the log is completed.
+        """
         self.number: int | None = None
+        self.detail, self._running, self._patience = "", running, Patience(BLOCK_LIMIT)
 
     def __enter__(self) -> "Stop":
-        self._before = {n: signal.signal(n, self._note) for n in ENDING}
+        handlers = dict.fromkeys(ENDING, self._note) | {signal.SIGALRM: self._interrupt_block}
+        self._before = {number: signal.signal(number, handler) for number, handler in handlers.items()}
         return self
 
     def _note(self, number: int, _: object) -> None:
+        if self.number is None:
+            self._patience.restart()
+            signal.setitimer(signal.ITIMER_REAL, REPEAT_DELAY, REPEAT_DELAY)
         self.number = number
 
+    def _interrupt_block(self, *_: object) -> None:
+        if self.number is not None and self._patience.over and (name := self._running()):
+            self.detail = f"block {name} did not return"
+            self.check()
+
     def __exit__(self, *_: object) -> None:
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
         for number, handler in self._before.items():
             signal.signal(number, handler)
 
     def check(self) -> None:
         """Raise `Interrupted` if a signal was received."""
         if self.number is not None:
-            raise Interrupted(self.number)
+            raise Interrupted(self.number, self.detail)
 
 
 def raise_on_interrupt() -> None:

@@ -11,13 +11,14 @@ from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.processes.child_process import Child, start, terminate_unused
 from lapwing.cosim.processes.patience import Patience
 from lapwing.cosim.processes.run_monitor import LONGEST, MONITOR, RunMonitor
-from lapwing.cosim.processes.supervisor import SHUTDOWN_TIMEOUT, RunState, RunSupervisor, reason
-from lapwing.cosim.run_errors import END_SIGNAL
+from lapwing.cosim.processes.supervisor import SHUTDOWN_TIMEOUT, RunState, RunSupervisor, is_stopped_by_signal, reason
+from lapwing.cosim.run_errors import END_SIGNAL, RunFailed
 from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import ALIVE_KEY
 from lapwing.cosim.transport.session_settings import CHILD_LINKS, mesh
 
-TERM_TIMEOUT = 1.5  # [s] from the request to end to SIGKILL
+TERM_TIMEOUT = 4.0  # [s] from the request to end to SIGKILL; more than the watchdog of a service takes
+HUNG = 128 + END_SIGNAL  # exit code by the watchdog of a service, whose last line names the block
 BRIEF = 0.005  # [s] between two checks whether all processes have exited
 
 
@@ -44,13 +45,14 @@ def launch(
         services: services that publish log packets.
 
     Raises:
-        RunFailed: a service died or stalled, or the run ended early.
+        RunFailed: a service died or stalled, the run ended early, or a process did not end by itself.
         ValueError: a service rejected its configuration; the text says why.
     """
     # optional ones first: a ground station may be waiting for its link
     own = [name for name in [*optional, *required] if name not in external]
     children: dict[str, Child] = {}
     exited: dict[str, int] = {}  # exit codes of optional processes that ended before the run
+    error: RunFailed | None = None
     with private_endpoints([MONITOR, *own]) as sockets, ExitStack() as stack:
         stack.callback(_close, children)
         endpoints = {**external, **sockets}
@@ -82,17 +84,26 @@ def launch(
                 supervisor.supervise(observe)
                 if supervisor.state is RunState.ENDED:  # their reports follow
                     _wait([children[name] for name in optional], SHUTDOWN_TIMEOUT)
+            except RunFailed as failure:
+                error = failure
             finally:
                 for name in optional:
                     if name in children and (code := children[name].process.poll()) is not None:
                         exited[name] = code
                 _request_end(children.values())  # before this session closes, which takes a while
-        _end(children.values())
+        hung = _end(children)
+        if monitor.start is None and monitor.compiling:
+            hung = {}  # they were ended while they compiled
+        named = [f"{name}: {text}" for name, text in hung.items() if name in required]
+        if named:
+            raise RunFailed("; ".join([*([str(error)] if error else []), *named]))
+        if error:
+            raise error
         return {name: _final_output(children[name], exited.get(name, 0)) for name in optional}
 
 
 def _close(children: Mapping[str, Child]) -> None:
-    _end(children.values())
+    _end(children)
     for child in children.values():
         child.output.close()
 
@@ -114,15 +125,21 @@ def _wait(children: list[Child], seconds: float) -> None:
         time.sleep(BRIEF)
 
 
-def _end(children: Iterable[Child]) -> None:
-    """End all processes that still run: request first, then kill."""
-    children = list(children)
-    _request_end(children)
-    _wait(children, TERM_TIMEOUT)
-    for child in children:
-        if child.process.poll() is None:
+def _end(children: Mapping[str, Child]) -> dict[str, str]:
+    """End all processes that still run: request first, then kill. Return by name what did not end by itself."""
+    stopped = [name for name, child in children.items() if is_stopped_by_signal(child.process)]
+    _request_end(children.values())
+    _wait([*children.values()], TERM_TIMEOUT)
+    hung: dict[str, str] = {}
+    for name, child in children.items():
+        if killed := child.process.poll() is None:
             child.process.kill()
             child.process.wait()
+        if child.process.poll() == HUNG:  # also if it exited just before it was killed
+            hung[name] = child.last_line().rpartition("; ")[2]
+        elif killed and name not in stopped:
+            hung[name] = f"did not end within {TERM_TIMEOUT:g} s, killed"
         if child.process.stdin:
             with suppress(BrokenPipeError):  # killed before it had read its specification
                 child.process.stdin.close()
+    return hung

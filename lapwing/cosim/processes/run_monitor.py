@@ -10,6 +10,7 @@ from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import (
     ALIVE_KEY,
     BATCH_KEY,
+    BLOCK_TIME_KEY,
     COMPILING_KEY,
     DIVERGED_KEY,
     ENDED_KEY,
@@ -28,6 +29,7 @@ LONGEST = 60.0  # [s] instead of `STALL` while processes wait for a processor
 MONITOR = "mission"  # name of the run monitor among the participants
 MONITORED_KEYS = (
     BATCH_KEY,
+    BLOCK_TIME_KEY,
     WAITING_KEY,
     OUTSIDE_KEY,
     COMPILING_KEY,
@@ -78,6 +80,7 @@ class RunMonitor:
         self.wall = 0.0  # [s] from the first log packet to the newest
         self.ended = False  # a service has published its last log packet
         self.outcome: str | None = None  # "" if the run was completed, the reason if it ended early; None: unknown
+        self.block_times: dict[str, float] = {}  # [s] of processor time in the blocks of a service, at its end
         self._rejected: dict[str, int] = {}  # numbers of rejected messages by participant
         self.last_news = time.monotonic()
         senders: dict[str, bytes | None] = {}
@@ -124,6 +127,8 @@ class RunMonitor:
             self.compiling = True
         elif head == DIVERGED_KEY:
             self.diverged = True
+        elif head == BLOCK_TIME_KEY:
+            self.block_times[name] = float(payload)
         elif head == WAITING_KEY:
             self.waiting[name] = payload.decode(errors="replace")
         elif head == OUTSIDE_KEY:
@@ -154,11 +159,11 @@ class RunMonitor:
         self.wall = self.last_news - self.start
         self._times[name] = max(time_ns, self._times.get(name, 0))
         self.time_ns = min(self._times.values())
-        _, _, pages = unpack_log_packet(payload)
-        for page in pages:
-            self.newest[page.topic] = page.payloads[-1].tobytes()
+        _, _, batches = unpack_log_packet(payload)
+        for batch in batches:
+            self.newest[batch.topic] = batch.payloads[-1].tobytes()
         if self.on_batches:
-            self.on_batches(pages)
+            self.on_batches(batches)
 
     def _note_last_packet(self, name: str) -> None:
         if name in self._unfinished:

@@ -58,7 +58,7 @@ class RunSupervisor:
         self._required, self._external = set(required), set(external)
         self._own = [name for name in children if name in self._required]
         self._optional = [name for name in children if name not in self._required]
-        self._is_stopped = is_stopped or _is_stopped
+        self._is_stopped = is_stopped or is_stopped_by_signal
         self._starvation = Starvation()
         self._stopped_since: dict[str, float] = {}
         self._ending_since = 0.0
@@ -219,7 +219,8 @@ def reason(code: int) -> str:
     return f"signal {number}" if number > 0 else f"exit code {code}"
 
 
-def _is_stopped(child: ChildProcess) -> bool:
+def is_stopped_by_signal(child: ChildProcess) -> bool:
+    """Return True if a child is stopped, for example by SIGSTOP."""
     try:
         return os.waitid(os.P_PID, child.pid, os.WSTOPPED | os.WNOHANG | os.WNOWAIT) is not None
     except ChildProcessError:  # it has just exited

@@ -6,9 +6,6 @@ from functools import partial
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
-from lapwing.cosim.config.former_names import present_tables
 from lapwing.cosim.scene import vehicle_scenes
 from lapwing.cosim.scene.files import Files, deep_copy, parse_toml
 from lapwing.cosim.scene.key_origin import line_of, source_of
@@ -17,7 +14,7 @@ from lapwing.cosim.scene.scene import Scene, SceneTable, Vocabulary
 from lapwing.cosim.scene.scene_error import KeyOrigin, SceneError
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.input_file import check_regular
-from lapwing.dynamics.validation import fault
+from lapwing.dynamics.validation import validated
 
 SCENES_HINT = "expected a scene file (.toml); `lapwing scenes` lists the shipped scenes"
 SCENE_FILE = "scene.toml"  # the scene's own text among its sources
@@ -125,7 +122,6 @@ def from_resolved(tree: Mapping[str, Any], vocabulary: Vocabulary, name: str) ->
     Raises:
         SceneError: the scene is no longer valid.
     """
-    tree = present_tables(tree)
     with Scene(Path(name), {}, vocabulary).located():
         if isinstance(entries := tree.get(vehicle_scenes.VEHICLE), list):
             shared = {name: table for name, table in tree.items() if name != vehicle_scenes.VEHICLE}
@@ -196,9 +192,9 @@ def _tables(tree: Mapping[str, Any], vocabulary: Vocabulary) -> dict[type[SceneT
         if not isinstance(raw, dict):
             raise ConfigError(name, f"got {raw!r}", f"a table [{name}]")
         try:
-            tables[section] = section.model_validate(deep_copy(raw))
-        except ValidationError as error:
-            raise fault(error, section).with_prefix(name) from None
+            tables[section] = validated(section.model_validate, deep_copy(raw), section)
+        except ConfigError as error:
+            raise error.with_prefix(name) from None
     return tables
 
 

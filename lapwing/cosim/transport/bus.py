@@ -15,9 +15,8 @@ from typing import Any
 import zenoh
 
 from lapwing.cosim.run_errors import BusError
-from lapwing.cosim.transport.ring_subscription import Inbox
 from lapwing.cosim.transport.session_settings import one_runtime_thread, session_settings
-from lapwing.cosim.transport.subscription import Message, Subscription
+from lapwing.cosim.transport.subscription import Inbox, Message, Subscription
 from lapwing.messages.attachment import pack, time_and_gid
 
 INBOX = 4096  # [messages] far more than arrive in lock step before one is read

@@ -18,7 +18,7 @@ from lapwing.messages.topics import Topic
 
 LOG_PERIOD = 0.1  # [s] of wall time between two log packets
 WATCH_PERIOD = 0.2  # [s] between two checks of the watchdog
-PAGE = 1024  # [ticks] limit of a log packet
+PACKET_TICKS = 1024  # [ticks] limit of a log packet
 
 _due = python_function(due)
 
@@ -30,11 +30,11 @@ class EndOfRun(Exception):
 class PacketReceiver:
     """Receiver of the step packets of one producer."""
 
-    def __init__(self, process: Participant, name: str, inputs: list[tuple[str, int, int]], graph: BlockDiagram):
+    def __init__(self, process: Participant, name: str, inputs: list[tuple[str, int, int]], diagram: BlockDiagram):
         """Subscribe to the service `name`; `inputs` has (port, period, delay) of each input that it produces."""
-        self._process, self._name, self._inputs, self._graph = process, name, inputs, graph
-        self._schedule = packet_schedule(process.setup, name, process.name) if process.packs_ticks else EACH_TICK
-        self._codec = StepPacketCodec(self._schedule.ports(process.setup.services[name].ports), self._schedule.ticks)
+        self._process, self._name, self._inputs, self._diagram = process, name, inputs, diagram
+        self._schedule = packet_schedule(process.config, name, process.name) if process.packs_ticks else EACH_TICK
+        self._codec = StepPacketCodec(self._schedule.ports(process.config.services[name].ports), self._schedule.ticks)
         ((key, gid),) = process.participants.senders(self._schedule.key, [name]).items()
         self._inbox = process.bus.inbox(key, gid)
         self._timings = {(period, delay) for _, period, delay in inputs}
@@ -55,7 +55,7 @@ class PacketReceiver:
             packet_tick = self._newest + 1
             while not self._codec.due(packet_tick):
                 packet_tick += self._schedule.every
-            expected_ns = packet_tick * self._process.setup.interval_ns
+            expected_ns = packet_tick * self._process.config.interval_ns
             time_ns, payload = self._inbox.get(POLL) or self._process.wait_with_status(
                 self._inbox.get, lambda: self._describe(newest_due)
             )
@@ -64,7 +64,7 @@ class PacketReceiver:
             if time_ns != expected_ns:
                 raise LockStepError(f"{self._name}: expected the step packet of tick {packet_tick}, got {time_ns} ns")
             try:
-                self._codec.unpack(payload, self._graph, packet_tick)
+                self._codec.unpack(payload, self._diagram, packet_tick)
             except PacketError as error:
                 raise LockStepError(f"{self._name}: {error}") from None
             self._newest = packet_tick + self._schedule.every - 1
@@ -76,14 +76,14 @@ class PacketReceiver:
         return f"{', '.join(ports)} of tick {tick} from {self._name}"
 
 
-def packet_receivers(process: Participant, graph: BlockDiagram) -> list[PacketReceiver]:
+def packet_receivers(process: Participant, diagram: BlockDiagram) -> list[PacketReceiver]:
     """Return a receiver for each producer of an input of this process's service."""
-    setup = process.setup
+    config = process.config
     inputs: dict[str, list[tuple[str, int, int]]] = {}
-    for i in setup.services[process.name].inputs:
-        producer = setup.producers[i.port]
-        inputs.setdefault(producer, []).append((i.port, setup.port(i.port).period, i.delay))
-    return [PacketReceiver(process, producer, ports, graph) for producer, ports in sorted(inputs.items())]
+    for i in config.services[process.name].inputs:
+        producer = config.producers[i.port]
+        inputs.setdefault(producer, []).append((i.port, config.port(i.port).period, i.delay))
+    return [PacketReceiver(process, producer, ports, diagram) for producer, ports in sorted(inputs.items())]
 
 
 @dataclass
@@ -95,11 +95,11 @@ class _StepOutlet:
     put: Callable[[bytes, int], None]
     next_tick: int = 0  # first tick of the next packet
 
-    def publish(self, graph: BlockDiagram, stop: int, interval_ns: int) -> None:
+    def publish(self, diagram: BlockDiagram, stop: int, interval_ns: int) -> None:
         """Publish the packets that are complete before the tick `stop`."""
         while (tick := self.next_tick) + self.schedule.ticks <= stop:
             if self.codec.due(tick):
-                self.put(self.codec.pack(graph, tick), tick * interval_ns)
+                self.put(self.codec.pack(diagram, tick), tick * interval_ns)
             self.next_tick += self.schedule.every
 
 
@@ -116,12 +116,12 @@ class _TopicPublisher:
         """Store which topics have subscribers."""
         self._subscribed = {topic for topic, key in self._keys.items() if self._bus.has_subscribers([key])}
 
-    def publish(self, graph: BlockDiagram, first: int, stop: int, interval_ns: int) -> None:
+    def publish(self, diagram: BlockDiagram, first: int, stop: int, interval_ns: int) -> None:
         """Publish the messages of the ticks [first, stop)."""
         if self._subscribed:
-            for page in graph.record_batches(first, stop, self._subscribed, keep=True):
-                for at, payload in zip(page.ticks, page.payloads, strict=True):
-                    self.publishers[page.topic](payload.tobytes(), int(at) * interval_ns)
+            for batch in diagram.record_batches(first, stop, self._subscribed, keep=True):
+                for at, payload in zip(batch.ticks, batch.payloads, strict=True):
+                    self.publishers[batch.topic](payload.tobytes(), int(at) * interval_ns)
 
 
 class PublishWatchdog:
@@ -160,21 +160,21 @@ class PublishWatchdog:
 class PacketSender:
     """Publisher of the output of a service: step packets, log packets, and topics with subscribers."""
 
-    def __init__(self, process: Participant, service: Service, graph: BlockDiagram, publishes_steps: bool = True):
+    def __init__(self, process: Participant, service: Service, diagram: BlockDiagram, publishes_steps: bool = True):
         """Declare the publishers; without `publishes_steps`, an external program publishes the step packets."""
         key_prefix, bus = process.key_prefix, process.bus
-        self._process, self._graph = process, graph
+        self._process, self._diagram = process, diagram
         self._outlets = []
         if publishes_steps:
-            for schedule in packet_schedules(process.setup, service.name) if process.packs_ticks else {EACH_TICK}:
+            for schedule in packet_schedules(process.config, service.name) if process.packs_ticks else {EACH_TICK}:
                 put = bus.publisher(f"{key_prefix}/{schedule.key}/{service.name}")
-                codec = StepPacketCodec(schedule.ports(process.setup.services[service.name].ports), schedule.ticks)
+                codec = StepPacketCodec(schedule.ports(process.config.services[service.name].ports), schedule.ticks)
                 self._outlets.append(_StepOutlet(schedule, codec, put))
         self._put_log = bus.publisher(f"{key_prefix}/{BATCH_KEY}/{service.name}")
         self._topics = _TopicPublisher(process, service)
         self._logged = 0  # first tick that is not in a log packet
         self._log_due = 0.0  # [s] of the monotonic clock
-        self._interval_ns = process.setup.interval_ns
+        self._interval_ns = process.config.interval_ns
         bus.publisher(f"{key_prefix}/{WAITING_KEY}/{service.name}")  # declared early, before queues are full
         self._watchdog = PublishWatchdog(
             lambda: process.publish_status(WAITING_KEY, "a consumer that accepts no data"), PATIENCE
@@ -188,9 +188,9 @@ class PacketSender:
         """Publish the output of the ticks [first, stop)."""
         with self._watchdog:
             for outlet in self._outlets:
-                outlet.publish(self._graph, stop, self._interval_ns)
-            self._topics.publish(self._graph, first, stop, self._interval_ns)
-            if stop - self._logged >= PAGE or time.monotonic() > self._log_due:
+                outlet.publish(self._diagram, stop, self._interval_ns)
+            self._topics.publish(self._diagram, first, stop, self._interval_ns)
+            if stop - self._logged >= PACKET_TICKS or time.monotonic() > self._log_due:
                 self._publish_log(stop)
                 self._process.report_rejected()
                 self.refresh_subscribers()
@@ -198,7 +198,7 @@ class PacketSender:
     def _publish_log(self, stop: int) -> None:
         self._log_due = time.monotonic() + LOG_PERIOD
         if stop > self._logged:
-            pages = self._graph.record_batches(self._logged, stop)
+            pages = self._diagram.record_batches(self._logged, stop)
             self._put_log(pack_log_packet(pages, self._logged, stop), (stop - 1) * self._interval_ns)
             self._logged = stop
 

@@ -17,9 +17,9 @@ from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.transport.bus_keys import STEP_KEY
 
 
-def ticks_per_packet(setup: RunConfig, name: str) -> int:
+def ticks_per_packet(config: RunConfig, name: str) -> int:
     """Return the number of ticks that a service steps and publishes at once."""
-    delays = [i.delay for i in setup.services[name].inputs]
+    delays = [i.delay for i in config.services[name].inputs]
     return max(1, min(delays, default=0) // 2)
 
 
@@ -45,17 +45,17 @@ EACH_TICK = PacketSchedule(1, 1)
 """A packet at each tick with all outputs of a service."""
 
 
-def packet_schedule(setup: RunConfig, producer: str, consumer: str) -> PacketSchedule:
+def packet_schedule(config: RunConfig, producer: str, consumer: str) -> PacketSchedule:
     """Return the schedule of the packets from one service to a consumer."""
-    if (ticks := max(ticks_per_packet(setup, producer), ticks_per_packet(setup, consumer))) > 1:
+    if (ticks := max(ticks_per_packet(config, producer), ticks_per_packet(config, consumer))) > 1:
         return PacketSchedule(ticks, ticks)
-    consumed = {i.port for i in setup.services[consumer].inputs}
-    periods = [port.period for port in setup.services[producer].ports if port.name in consumed]
+    consumed = {i.port for i in config.services[consumer].inputs}
+    periods = [port.period for port in config.services[producer].ports if port.name in consumed]
     return PacketSchedule(1, math.gcd(*periods))
 
 
-def packet_schedules(setup: RunConfig, producer: str) -> set[PacketSchedule]:
+def packet_schedules(config: RunConfig, producer: str) -> set[PacketSchedule]:
     """Return the packet schedules of a service; one packet per tick if it has no consumer."""
-    produced = {port.name for port in setup.services[producer].ports}
-    consumers = [name for name, service in setup.services.items() if any(i.port in produced for i in service.inputs)]
-    return {packet_schedule(setup, producer, consumer) for consumer in consumers} or {EACH_TICK}
+    produced = {port.name for port in config.services[producer].ports}
+    consumers = [name for name, service in config.services.items() if any(i.port in produced for i in service.inputs)]
+    return {packet_schedule(config, producer, consumer) for consumer in consumers} or {EACH_TICK}

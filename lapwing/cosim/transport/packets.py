@@ -23,7 +23,7 @@ from lapwing.cosim.diagram.topic_encoder import RecordBatch, due_ticks
 from lapwing.kernels.row_packing import row_width
 from lapwing.messages.topics import topic_named
 
-_PAGE = struct.Struct("<HII")
+_BATCH = struct.Struct("<HII")
 _TICKS = struct.Struct("<qq")
 
 
@@ -45,7 +45,7 @@ class StepPacketCodec:
 
     def __init__(self, ports: Sequence[Port], ticks: int = 1):
         """Create the codec of a service with these ports, in order; a packet holds `ticks` ticks."""
-        self._ports = [(port.name, port.period, row_width(port.like)) for port in ports]
+        self._ports = [(port.name, port.period, row_width(port.example)) for port in ports]
         self._periods = sorted({port.period for port in ports})
         self._cycle = math.lcm(*self._periods)  # [ticks] period of the packets' contents
         self._ticks = ticks
@@ -61,13 +61,13 @@ class StepPacketCodec:
         rows = self._rows(first)
         return 8 * rows[-1].place.stop if rows else 0
 
-    def pack(self, graph: BlockDiagram, first: int) -> bytes:
+    def pack(self, diagram: BlockDiagram, first: int) -> bytes:
         """Return the packet that starts at the tick `first`, from the rows of a diagram."""
         if self._ticks == 1:
-            return b"".join([graph.row(rows.port, first).tobytes() for rows in self._rows(first)])
-        return b"".join([graph.rows(rows.port, self._due(rows, first)).tobytes() for rows in self._rows(first)])
+            return b"".join([diagram.row(rows.port, first).tobytes() for rows in self._rows(first)])
+        return b"".join([diagram.rows(rows.port, self._due(rows, first)).tobytes() for rows in self._rows(first)])
 
-    def unpack(self, payload: bytes, graph: BlockDiagram, first: int) -> None:
+    def unpack(self, payload: bytes, diagram: BlockDiagram, first: int) -> None:
         """Store the rows of the packet that starts at the tick `first` in a diagram that uses them.
 
         Raises:
@@ -77,12 +77,12 @@ class StepPacketCodec:
             raise PacketError(f"step packet of {len(payload)} bytes at tick {first}, expected {self.size(first)}")
         numbers = np.frombuffer(payload, "<f8")
         for rows in self._rows(first):
-            if not graph.has(rows.port):
+            if not diagram.has(rows.port):
                 continue
             if self._ticks == 1:
-                graph.put_row(rows.port, first, numbers[rows.place])
+                diagram.put_row(rows.port, first, numbers[rows.place])
             else:
-                graph.put_rows(rows.port, self._due(rows, first), numbers[rows.place].reshape(rows.number, -1))
+                diagram.put_rows(rows.port, self._due(rows, first), numbers[rows.place].reshape(rows.number, -1))
 
     def _due(self, rows: _Rows, first: int) -> np.ndarray:
         return due_ticks(first, first + self._ticks, rows.period)
@@ -107,14 +107,14 @@ class StepPacketCodec:
         return self._known[numbers]
 
 
-def pack_log_packet(pages: Iterable[RecordBatch], start: int, stop: int) -> bytes:
+def pack_log_packet(batches: Iterable[RecordBatch], start: int, stop: int) -> bytes:
     """Return a log packet of record batches with all messages of the ticks [start, stop)."""
     parts = [_TICKS.pack(start, stop)]
-    for page in pages:
-        payloads = np.ascontiguousarray(page.payloads)
-        size = payloads.nbytes // len(page.ticks)
-        name = page.topic.name.encode()
-        parts += [_PAGE.pack(len(name), len(page.ticks), size), name, page.ticks.tobytes(), payloads.tobytes()]
+    for batch in batches:
+        payloads = np.ascontiguousarray(batch.payloads)
+        size = payloads.nbytes // len(batch.ticks)
+        name = batch.topic.name.encode()
+        parts += [_BATCH.pack(len(name), len(batch.ticks), size), name, batch.ticks.tobytes(), payloads.tobytes()]
     return b"".join(parts)
 
 
@@ -126,17 +126,17 @@ def unpack_log_packet(payload: bytes) -> tuple[int, int, list[RecordBatch]]:
     """
     try:
         start, stop = _TICKS.unpack_from(payload)
-        place, pages = _TICKS.size, []
+        place, batches = _TICKS.size, []
         while place < len(payload):
-            length, n, size = _PAGE.unpack_from(payload, place)
-            place += _PAGE.size
+            length, n, size = _BATCH.unpack_from(payload, place)
+            place += _BATCH.size
             topic = topic_named(payload[place : place + length].decode())
             place += length
             ticks = np.frombuffer(payload, "<i8", n, place)
             place += 8 * n
             payloads = np.frombuffer(payload, np.uint8, n * size, place).reshape(n, size)
             place += n * size
-            pages.append(RecordBatch(topic, ticks, payloads))
-        return start, stop, pages
+            batches.append(RecordBatch(topic, ticks, payloads))
+        return start, stop, batches
     except (struct.error, ValueError, IndexError) as error:
         raise PacketError(f"log packet of {len(payload)} bytes: {error}") from None

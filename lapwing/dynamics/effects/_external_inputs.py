@@ -22,6 +22,11 @@ def external(parameters: type) -> type:
     return parameters
 
 
+def has_inputs(parameters: type) -> bool:
+    """Return True if the parameter class of an effect is declared by `external`."""
+    return parameters in _CLASSES
+
+
 def inputs_of(effects: tuple) -> list[Any]:
     """Return the prototypes of the named inputs, one of each effect that has them, in the order of the effects."""
     return [e.inputs for e in effects if type(e) in _CLASSES]

@@ -34,14 +34,9 @@ def validate_table(cls: type[T], table: Mapping[str, Any]) -> T:
     Raises:
         ConfigError: a key is missing, unknown, of the wrong type or out of range.
     """
-    from pydantic import ValidationError
+    from lapwing.dynamics.validation import validated
 
-    from lapwing.dynamics.validation import fault
-
-    try:
-        return _adapter(cls).validate_python(_tuples(table))  # type: ignore[arg-type]
-    except ValidationError as error:
-        raise fault(error, cls) from None
+    return validated(_adapter(cls).validate_python, _tuples(table), cls)  # type: ignore[arg-type]
 
 
 def _tuples(value: Any) -> Any:

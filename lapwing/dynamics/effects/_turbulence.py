@@ -1,4 +1,10 @@
-"""Low-altitude turbulence: intensities, scales and convection speed (MIL-F-8785C), and its draws as a sum of parts."""
+"""Low-altitude turbulence: intensities, scales and convection speed (MIL-F-8785C), and its samples as a sum of parts.
+
+A process with its own rate: samples are `SAMPLE_TIME` apart, or a communication step if that is longer, with exact
+covariances, and the air changes linearly between them. So flights at communication rates of 250 Hz and its doubles have
+the same turbulence. Up to a third of the Nyquist rate of the samples its spectrum is within 3 % of von Karman's, and
+that of Dryden multiplied by sinc^2 of frequency over sampling rate (theory, section 2.5).
+"""
 
 from typing import Annotated, Any, NamedTuple
 
@@ -10,14 +16,17 @@ from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.noise import normal3
 from lapwing.dynamics.terrain import LEVEL, surface
 from lapwing.dynamics.vector import ZERO, Vec3, add, first, multiply, norm, scale, subtract
-from lapwing.kernels import always_inline, math
+from lapwing.kernels import always_inline, math, noinline
 from lapwing.kernels.codegen import map_tuple
 
 KIND = "turbulence"
 FOOT = 0.3048  # [m]
 LOWEST, HIGHEST = 10.0 * FOOT, 1000.0 * FOOT  # [m] range of altitudes of the model
 SLOWEST = 0.1  # [m/s] lower limit: gusts do not pass a vehicle that moves with the wind
-LONG_AGO = 50.0  # correlation times from the start of the filters to the first exchange
+LONG_AGO = 50.0  # correlation times from the start of the filters to the first sample
+SAMPLE_TIME = 0.004  # [s] largest time between samples that are further apart than a communication step
+ROUNDING = 1e-9  # relative to that time
+NOT_STARTED = -1.0  # [s] time of the last sample, before the first
 
 
 class Settings(NamedTuple):
@@ -115,9 +124,42 @@ def second_order(x1, x2, theta, n1, n2):
 
 
 @always_inline
-def time_since_update(started, rate, interval):
-    """Return the time [s] since the last update: `LONG_AGO` before the first, at these rates [1/s] of the filters."""
-    return interval if started > 0.0 else LONG_AGO / min(min(rate[0], rate[1]), rate[2])
+def ticks_per_sample(interval):
+    """Return the number of communication steps of `interval` [s] between samples: a power of two, at least 1."""
+    number = 1
+    while 2 * number * interval <= SAMPLE_TIME * (1.0 + ROUNDING):
+        number *= 2
+    return number
+
+
+@always_inline
+def time_to_sample(started, rate, period):
+    """Return the time [s] that a sample advances the filters: long before the first, at these rates [1/s] of them."""
+    return period if started else LONG_AGO / min(min(rate[0], rate[1]), rate[2])
+
+
+@always_inline
+def next_line(line, last, now, started, sample, period):
+    """Return (value at `now` [s], slope [1/s]) that reaches a sample after `period` [s]; constant before the first.
+
+    Args:
+        line: (value, slope) since the last sample.
+        last: time [s] of that sample.
+        now: present time [s].
+        started: False before the first sample.
+        sample: value at the end of the period.
+        period: time [s] to the next sample.
+    """
+    if not started:
+        return sample, ZERO
+    value = on_line(line, now - last)
+    return value, scale(1.0 / period, subtract(sample, value))
+
+
+@always_inline
+def on_line(line, time):
+    """Return the value `time` [s] after the last sample."""
+    return add(line[0], scale(time, line[1]))
 
 
 @always_inline
@@ -143,16 +185,16 @@ def transverse(x1, x2):
     return math.sqrt(3.0) * x1 + (1.0 - math.sqrt(3.0)) * x2
 
 
-def calm(parts: tuple[Part, ...]) -> tuple[tuple, Vec3, float]:
-    """Return (along, two states across, two vertical) of each part, the wind [m/s], and 1 once started."""
-    return ((0.0, 0.0, 0.0, 0.0, 0.0),) * len(parts), ZERO, 0.0
+def calm(parts: tuple[Part, ...]) -> tuple[tuple, tuple[Vec3, Vec3], float]:
+    """Return (along, two states across, two vertical) of each part, (wind [m/s], slope), time [s] of the sample."""
+    return ((0.0, 0.0, 0.0, 0.0, 0.0),) * len(parts), (ZERO, ZERO), NOT_STARTED
 
 
-@always_inline
+@noinline
 def _advance_part(c, part, state):
     """Return (states, gust for unit deviations) of a part, `theta` correlation times of the whole later."""
-    theta, key, tick = c
-    first, second = normal3(key, tick, part.lanes[0]), normal3(key, tick, part.lanes[1])
+    theta, key, number = c
+    first, second = normal3(key, number, part.lanes[0]), normal3(key, number, part.lanes[1])
     states, gust = advance_filters(state, scale(part.ratio, theta), first, second)
     return states, scale(part.share, gust)
 
@@ -164,20 +206,26 @@ def _gust(axis, part, _):
 
 @always_inline
 def drawn(e, memory, s, key, tick, interval):
-    """Return the states of the parts, the wind [m/s, world] for the next interval, and 1: started."""
+    """Return the states of the parts, the wind [m/s, world] and its slope to the next sample, and the time [s]."""
+    every = ticks_per_sample(interval)
+    started = memory[2] >= 0.0
+    if started and tick % every != 0:
+        return memory
+    period, now = every * interval, tick * interval
     sigma, rate = deviation_and_rate(e.conditions, s)
-    theta = scale(time_since_update(memory[2], rate, interval), rate)
-    parts = map_tuple(_advance_part, (theta, key, tick), e.parts, memory[0])
+    theta = scale(time_to_sample(started, rate, period), rate)
+    parts = map_tuple(_advance_part, (theta, key, tick // every), e.parts, memory[0])
     gust = (
         total(map_tuple(_gust, 0, parts, parts)),
         total(map_tuple(_gust, 1, parts, parts)),
         total(map_tuple(_gust, 2, parts, parts)),
     )
     u, v, w = multiply(sigma, gust)
-    return map_tuple(first, 0, parts, parts), in_world(e.conditions, u, v, w), 1.0
+    line = next_line(memory[1], memory[2], now, started, in_world(e.conditions, u, v, w), period)
+    return map_tuple(first, 0, parts, parts), line, now
 
 
 @always_inline
-def add_to_air(memory, before):
+def add_to_air(memory, s, before):
     """Add the turbulence to the air."""
-    return Air(before.density, add(before.wind_world, memory[1]))
+    return Air(before.density, add(before.wind_world, on_line(memory[1], s.t - memory[2])))

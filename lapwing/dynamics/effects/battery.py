@@ -6,10 +6,9 @@ from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.effects._external_inputs import external, initial_state, input_or
 from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
-from lapwing.dynamics.effects._hooks import battery_state, discrete_update, supply_voltage
+from lapwing.dynamics.effects._hooks import battery_state, discrete_update, memory_rate, terminal_voltage
 from lapwing.dynamics.effects._rotor_sums import total
-from lapwing.kernels import always_inline, math, python_function
-from lapwing.kernels.codegen import map_tuple
+from lapwing.kernels import always_inline, math
 
 KIND = "battery model"
 
@@ -24,9 +23,10 @@ class Settings(NamedTuple):
 class Battery(NamedTuple):
     """Lithium-polymer cells in series: open-circuit voltage of the charge minus an ohmic drop (theory, eq. (2.10)).
 
-    The battery voltage limits the motor voltages. Charge and voltage are updated once per
-    communication step. Source: Chen and Rincon-Mora, IEEE Trans. Energy Conversion 21 (2006) 504, open-circuit
-    curve; one ohmic resistance, without transient ones. Valid at room temperature, charge above a few per cent.
+    The battery voltage limits the motor voltages. The charge is integrated with the motion, and the voltage solved
+    with the motors' power at every evaluation; the cut-off is decided once per communication step. Source: Chen and
+    Rincon-Mora, IEEE Trans. Energy Conversion 21 (2006) 504, open-circuit curve; one ohmic resistance, without
+    transient ones. Valid at room temperature, charge above a few per cent.
     """
 
     cells: float
@@ -45,9 +45,9 @@ class Battery(NamedTuple):
             float(pack.cells), pack.capacity, resistance, settings.initial_charge, pack.cells * settings.cutoff_voltage
         )
 
-    def initial_discrete_state(self) -> tuple[float, float, float]:
-        """Return (charge, voltage [V] under load, current [A])."""
-        return (self.initial_charge, self.cells * python_function(open_circuit_voltage)(self.initial_charge), 0.0)
+    def initial_discrete_state(self) -> tuple[float, float]:
+        """Return (charge, 1: on, 0: cut off)."""
+        return (self.initial_charge, 1.0)
 
     def with_inputs(self) -> "ExternalBattery":
         """Return the battery with named inputs."""
@@ -80,52 +80,80 @@ def open_circuit_voltage(charge):
 
 
 @always_inline
-def at_most(limit, voltage, _):
-    """Return the lower of voltage and limit."""
-    return min(voltage, limit)
+def under_load(open_circuit, resistance, power):
+    """Return the voltage [V] under a power [W]: the greater root of V = E - R P / V; E / 2 beyond the largest power."""
+    return 0.5 * (open_circuit + math.sqrt(max(open_circuit * open_circuit - 4.0 * resistance * power, 0.0)))
+
+
+@always_inline
+def current_of(voltage, power):
+    """Return the current [A] at a power [W]; zero with the battery off."""
+    return power / voltage if voltage > 0.0 else 0.0
+
+
+@terminal_voltage(Battery)
+def battery(e, memory, power):
+    """Return the voltage [V] under a power [W]; zero after the cut-off."""
+    charge, on = memory
+    return under_load(e.cells * open_circuit_voltage(charge), e.resistance, power) if on > 0.0 else 0.0
+
+
+@memory_rate(Battery)
+def discharge(e, memory, s, rotors):
+    """Return the rates of charge [1/s] and switch."""
+    power = total(rotors.power)
+    return _discharge(e, memory[0], current_of(battery(e, memory, power), power))
+
+
+@always_inline
+def _discharge(e, charge, current):
+    return (-current / e.capacity if charge > 0.0 else 0.0, 0.0)
 
 
 @discrete_update(Battery)
-def discharge(e, memory, s, rotors, key, tick, interval):
-    """Return the discrete state after an interval at the motors' power."""
-    charge, voltage, _ = memory
-    if voltage == 0.0:
-        return (charge, 0.0, 0.0)
-    current = total(rotors.power) / voltage
-    charge = max(charge - current * interval / e.capacity, 0.0)
-    voltage = e.cells * open_circuit_voltage(charge) - e.resistance * current
-    return (charge, voltage if voltage > e.cutoff_voltage else 0.0, current)
-
-
-@supply_voltage(Battery)
-def battery(e, memory, voltage):
-    """Return the voltage [V] of each motor."""
-    return map_tuple(at_most, memory[1], voltage, voltage)
+def cut_off(e, memory, s, rotors, key, tick, interval):
+    """Return the discrete state with the battery off for good if its voltage is too low."""
+    charge, _ = memory
+    return (charge, 1.0 if battery(e, memory, total(rotors.power)) > e.cutoff_voltage else 0.0)
 
 
 @battery_state(Battery)
-def read(e, memory):
+def read(e, memory, power):
     """Return charge, voltage [V] under load, current [A]; no temperature."""
-    return memory[0], memory[1], memory[2], math.nan
+    voltage = battery(e, memory, power)
+    return max(memory[0], 0.0), voltage, current_of(voltage, power), math.nan
+
+
+@always_inline
+def _with_charge(memory):
+    """Return the battery's own discrete state with the charge of the inputs."""
+    (charge, on), inputs = memory
+    return input_or(charge, inputs.charge), on
+
+
+@terminal_voltage(ExternalBattery)
+def external_battery(e, memory, power):
+    """Return the voltage [V] under a power [W], or that of the inputs; zero after the cut-off."""
+    own, inputs = _with_charge(memory), memory[1]
+    return input_or(battery(e.own, own, power), inputs.voltage) if own[1] > 0.0 else 0.0
+
+
+@memory_rate(ExternalBattery)
+def discharge_external(e, memory, s, rotors):
+    """Return the rates of the battery's own charge [1/s] and switch."""
+    power = total(rotors.power)
+    return _discharge(e.own, memory[0][0], current_of(external_battery(e, memory, power), power))
 
 
 @discrete_update(ExternalBattery)
-def discharge_external(e, memory, s, rotors, key, tick, interval):
-    """Return the discrete state after an interval, with the inputs in place of the battery's own numbers."""
-    before, inputs = memory
-    charge, own_voltage, current = discharge(e.own, before, s, rotors, key, tick, interval)
-    voltage = input_or(own_voltage, inputs.voltage)
-    is_on = before[1] != 0.0 and voltage > e.own.cutoff_voltage
-    return (input_or(charge, inputs.charge), voltage if is_on else 0.0, current), inputs
-
-
-@supply_voltage(ExternalBattery)
-def external_battery(e, memory, voltage):
-    """Return the voltage [V] of each motor."""
-    return battery(e.own, memory[0], voltage)
+def cut_off_external(e, memory, s, rotors, key, tick, interval):
+    """Return the discrete state with the inputs' charge, and off for good if the voltage is too low."""
+    is_on = external_battery(e, memory, total(rotors.power)) > e.own.cutoff_voltage
+    return (_with_charge(memory)[0], 1.0 if is_on else 0.0), memory[1]
 
 
 @battery_state(ExternalBattery)
-def read_external(e, memory):
+def read_external(e, memory, power):
     """Return charge, voltage [V] under load, current [A]; no temperature."""
-    return read(e.own, memory[0])
+    voltage = external_battery(e, memory, power)
+    return max(_with_charge(memory)[0], 0.0), voltage, current_of(voltage, power), math.nan

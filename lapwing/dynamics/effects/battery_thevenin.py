@@ -8,12 +8,11 @@ from lapwing.dynamics.atmosphere import temperature as air_temperature
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._external_inputs import external, initial_state, input_or
 from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
-from lapwing.dynamics.effects._hooks import battery_state, discrete_update, supply_voltage
+from lapwing.dynamics.effects._hooks import battery_state, discrete_update, memory_rate, terminal_voltage
 from lapwing.dynamics.effects._rotor_sums import total
-from lapwing.dynamics.effects.battery import KIND, BatteryInputs, at_most, open_circuit_voltage
+from lapwing.dynamics.effects.battery import KIND, BatteryInputs, current_of, open_circuit_voltage, under_load
 from lapwing.dynamics.environment import Environment
-from lapwing.kernels import math
-from lapwing.kernels.codegen import map_tuple
+from lapwing.kernels import always_inline, math
 
 __all__ = ["KIND", "OPTIONS", "BatteryThevenin", "Settings"]
 
@@ -47,8 +46,8 @@ class BatteryThevenin(NamedTuple):
     Resistances decrease as losses warm the pack. Source: Chen and Rincon-Mora, IEEE Trans. Energy Conversion 21
     (2006) 504: curve, ratios of the resistances and both time constants, above 20 % of charge; one thermal mass.
     Currents above 1 C use more charge by Peukert's law, if its exponent is given. The activation temperature, 20
-    kJ/mol over the gas constant, and the cooling time are chosen. Valid from -20 to 60 degC. Updated once per
-    communication step, exactly for a constant current.
+    kJ/mol over the gas constant, and the cooling time are chosen. Valid from -20 to 60 degC. Charge, transients and
+    temperature are integrated with the motion; cut-off and restart are decided once per communication step.
     """
 
     cells: float
@@ -94,17 +93,9 @@ class BatteryThevenin(NamedTuple):
         air = float(air_temperature(environment.atmosphere, environment.home.height))
         return self._replace(air_temperature=air, temperature=self.temperature if self.given_temperature else air)
 
-    def initial_discrete_state(self) -> tuple[float, float, float, float, float, float, float]:
-        """Return (charge, voltage [V], current [A], temperature [K], voltage of each transient [V], 1: on)."""
-        return (
-            self.initial_charge,
-            self.cells * open_circuit_voltage(self.initial_charge),
-            0.0,
-            self.temperature,
-            0.0,
-            0.0,
-            1.0,
-        )
+    def initial_discrete_state(self) -> tuple[float, float, float, float, float]:
+        """Return (charge, temperature [K], voltage of each transient [V], 1: on, 0: cut off)."""
+        return (self.initial_charge, self.temperature, 0.0, 0.0, 1.0)
 
     def with_inputs(self) -> "ExternalBatteryThevenin":
         """Return the battery with named inputs."""
@@ -123,59 +114,115 @@ class ExternalBatteryThevenin(NamedTuple):
         return initial_state(self)
 
 
-@discrete_update(BatteryThevenin)
-def discharge(e, memory, s, rotors, key, tick, interval):
-    """Return the discrete state after an interval at the motors' power."""
-    charge, voltage, _, temperature, fast, slow, on = memory
-    current = total(rotors.power) / voltage if on > 0.0 else 0.0
-    warmth = math.exp(e.activation * (1.0 / temperature - 1.0 / REFERENCE))
-    ohmic = warmth * e.resistance * current
-    fast_kept, slow_kept = math.exp(-interval / e.fast_time), math.exp(-interval / e.slow_time)
-    fast = fast_kept * fast + (1.0 - fast_kept) * warmth * e.fast * current
-    slow = slow_kept * slow + (1.0 - slow_kept) * warmth * e.slow * current
-    cooled = math.exp(-interval / e.cooling_time)
-    # the heat of the transients is that of the current through them, which is exact in the mean of a load
-    settled = e.air_temperature + (ohmic + fast + slow) * current * e.cooling_time / e.heat_capacity
-    temperature = settled + cooled * (temperature - settled)
+@always_inline
+def _warmth(e, temperature):
+    """Return the resistances over those at REFERENCE."""
+    return math.exp(e.activation * (1.0 / temperature - 1.0 / REFERENCE))
+
+
+@always_inline
+def _voltage(e, memory, power):
+    """Return the voltage [V] under a power [W], also while the controllers are off."""
+    charge, temperature, fast, slow, _ = memory
+    open_circuit = max(e.cells * open_circuit_voltage(charge) - fast - slow, 0.0)
+    return under_load(open_circuit, _warmth(e, temperature) * e.resistance, power)
+
+
+@always_inline
+def _power(memory, rotors):
+    """Return the power [W] of the motors; zero while the controllers are off."""
+    return total(rotors.power) if memory[4] > 0.0 else 0.0
+
+
+@always_inline
+def _rates(e, memory, current):
+    charge, temperature, fast, slow, _ = memory
+    warmth = _warmth(e, temperature)
     drain = current
     rated = e.capacity / 3600.0  # [A] 1 C
     if e.peukert_exponent > 1.0 and current > rated:
         drain = current * math.pow(current / rated, e.peukert_exponent - 1.0)
-    charge = max(charge - drain * interval / e.capacity, 0.0)
-    voltage = e.cells * open_circuit_voltage(charge) - ohmic - fast - slow
-    on = 1.0 if voltage > (e.cutoff_voltage if on > 0.0 else e.restart) else 0.0
-    return (charge, max(voltage, 0.0), current, temperature, fast, slow, on)
+    # the heat of the transients is that of the current through them, which is exact in the mean of a load
+    heat = (warmth * e.resistance * current + fast + slow) * current
+    return (
+        -drain / e.capacity if charge > 0.0 else 0.0,
+        heat / e.heat_capacity - (temperature - e.air_temperature) / e.cooling_time,
+        (warmth * e.fast * current - fast) / e.fast_time,
+        (warmth * e.slow * current - slow) / e.slow_time,
+        0.0,
+    )
 
 
-@supply_voltage(BatteryThevenin)
-def battery_thevenin(e, memory, voltage):
-    """Return the voltage [V] of each motor."""
-    return map_tuple(at_most, memory[1] * memory[6], voltage, voltage)
+@always_inline
+def _switched(e, memory, voltage):
+    """Return the discrete state with the controllers on or off by the battery's voltage [V]."""
+    charge, temperature, fast, slow, on = memory
+    return charge, temperature, fast, slow, 1.0 if voltage > (e.cutoff_voltage if on > 0.0 else e.restart) else 0.0
+
+
+@terminal_voltage(BatteryThevenin)
+def battery_thevenin(e, memory, power):
+    """Return the voltage [V] for the motors under a power [W]; zero while the controllers are off."""
+    return _voltage(e, memory, power) if memory[4] > 0.0 else 0.0
+
+
+@memory_rate(BatteryThevenin)
+def discharge(e, memory, s, rotors):
+    """Return the rates of the discrete state."""
+    power = _power(memory, rotors)
+    return _rates(e, memory, current_of(_voltage(e, memory, power), power))
+
+
+@discrete_update(BatteryThevenin)
+def switch(e, memory, s, rotors, key, tick, interval):
+    """Return the discrete state after cut-off or restart."""
+    return _switched(e, memory, _voltage(e, memory, _power(memory, rotors)))
 
 
 @battery_state(BatteryThevenin)
-def read(e, memory):
+def read(e, memory, power):
     """Return charge, terminal voltage [V], current [A], temperature [K]."""
-    return memory[0], memory[1], memory[2], memory[3]
+    power = power if memory[4] > 0.0 else 0.0
+    voltage = _voltage(e, memory, power)
+    return max(memory[0], 0.0), voltage, current_of(voltage, power), memory[1]
+
+
+@always_inline
+def _with_charge(memory):
+    """Return the battery's own discrete state with the charge of the inputs."""
+    (charge, temperature, fast, slow, on), inputs = memory
+    return input_or(charge, inputs.charge), temperature, fast, slow, on
+
+
+@always_inline
+def _external_voltage(e, memory, power):
+    """Return the voltage [V] under a power [W], or that of the inputs."""
+    return max(input_or(_voltage(e.own, _with_charge(memory), power), memory[1].voltage), 0.0)
+
+
+@terminal_voltage(ExternalBatteryThevenin)
+def external_battery(e, memory, power):
+    """Return the voltage [V] for the motors under a power [W]; zero while the controllers are off."""
+    return _external_voltage(e, memory, power) if memory[0][4] > 0.0 else 0.0
+
+
+@memory_rate(ExternalBatteryThevenin)
+def discharge_external(e, memory, s, rotors):
+    """Return the rates of the battery's own discrete state."""
+    power = _power(memory[0], rotors)
+    return _rates(e.own, memory[0], current_of(_external_voltage(e, memory, power), power))
 
 
 @discrete_update(ExternalBatteryThevenin)
-def discharge_external(e, memory, s, rotors, key, tick, interval):
-    """Return the discrete state after an interval, with the inputs in place of the battery's own numbers."""
-    before, inputs = memory
-    charge, voltage, current, temperature, fast, slow, _ = discharge(e.own, before, s, rotors, key, tick, interval)
-    voltage = max(input_or(voltage, inputs.voltage), 0.0)
-    on = 1.0 if voltage > (e.own.cutoff_voltage if before[6] > 0.0 else e.own.restart) else 0.0
-    return (input_or(charge, inputs.charge), voltage, current, temperature, fast, slow, on), inputs
-
-
-@supply_voltage(ExternalBatteryThevenin)
-def external_battery(e, memory, voltage):
-    """Return the voltage [V] of each motor."""
-    return battery_thevenin(e.own, memory[0], voltage)
+def switch_external(e, memory, s, rotors, key, tick, interval):
+    """Return the discrete state with the inputs' charge, after cut-off or restart."""
+    voltage = _external_voltage(e, memory, _power(memory[0], rotors))
+    return _switched(e.own, _with_charge(memory), voltage), memory[1]
 
 
 @battery_state(ExternalBatteryThevenin)
-def read_external(e, memory):
+def read_external(e, memory, power):
     """Return charge, terminal voltage [V], current [A], temperature [K]."""
-    return read(e.own, memory[0])
+    power = power if memory[0][4] > 0.0 else 0.0
+    voltage = _external_voltage(e, memory, power)
+    return max(_with_charge(memory)[0], 0.0), voltage, current_of(voltage, power), memory[0][1]

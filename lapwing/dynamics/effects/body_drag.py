@@ -5,10 +5,11 @@ from typing import Annotated, NamedTuple
 from annotated_types import Ge, Le
 
 from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
-from lapwing.dynamics.effects._hooks import wrench_body
+from lapwing.dynamics.effects._hooks import damping_rate, wrench_body
 from lapwing.dynamics.vector import NOTHING, Vec3, apply_transposed, multiply, norm, scale, subtract
 
 Coefficient = Annotated[float, Ge(0), Le(100)]
+DENSEST, FASTEST_WIND = 1.5, 60.0  # [kg/m^3] air and [m/s] wind, for the bound of the damping
 Triple = tuple[Coefficient, Coefficient, Coefficient]
 
 
@@ -51,3 +52,12 @@ def body_drag(e, memory, s, rotors):
         e.linear[2] + pressure * e.half_area[2],
     )
     return scale(-1.0, multiply(coefficient, v_body)), NOTHING
+
+
+@damping_rate(BodyDrag)
+def rate(e, memory, motion, body):
+    """Return a bound of the rate [1/s] at which drag changes the velocity."""
+    pressure = 2.0 * DENSEST * (norm(motion.velocity_world) + FASTEST_WIND)
+    areas, linear = e.half_area, e.linear
+    largest = pressure * max(max(areas[0], areas[1]), areas[2]) + max(max(linear[0], linear[1]), linear[2])
+    return largest * body.inverse_mass

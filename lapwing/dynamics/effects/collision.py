@@ -7,19 +7,7 @@ from annotated_types import Ge, Gt, Le
 from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
 from lapwing.dynamics.effects._hooks import wrench
 from lapwing.dynamics.effects._vehicle_interaction import interaction
-from lapwing.dynamics.vector import (
-    NOTHING,
-    ZERO,
-    Vec3,
-    add,
-    apply,
-    apply_transposed,
-    cross,
-    dot,
-    norm,
-    scale,
-    subtract,
-)
+from lapwing.dynamics.vector import NOTHING, ZERO, Vec3, add, apply, apply_transposed, cross, dot, norm, scale, subtract
 from lapwing.kernels import always_inline, math
 
 PUSH = 0.05  # share of the penetration that is corrected in each communication step

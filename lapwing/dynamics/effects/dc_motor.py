@@ -9,12 +9,7 @@ from lapwing.dynamics.effects._axes import by_axis
 from lapwing.dynamics.effects._external_motor import FULL_FRICTION, DcMotorInputs, ExternalDcMotor, idle_current
 from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.effects._hooks import discrete_update, motor, switches
-from lapwing.dynamics.effects._motor_winding import (
-    NONE,
-    decays_within,
-    transient_currents,
-    winding_constants,
-)
+from lapwing.dynamics.effects._motor_winding import NONE, decays_within, transient_currents, winding_constants
 from lapwing.dynamics.vector import first, pair, second
 from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import map_tuple, reduce_tuple

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from lapwing.dynamics.effects._axes import hub_speeds
 from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
-from lapwing.dynamics.effects._hooks import discrete_update, loads, switches
+from lapwing.dynamics.effects._hooks import decay_rate, loads, memory_rate, switches
 from lapwing.dynamics.effects._rotor_sums import with_changes
 from lapwing.dynamics.effects.axial_inflow import KIND, SUDDEN, fastest_spin
 from lapwing.dynamics.vector import pair
@@ -31,7 +31,7 @@ class DynamicInflow(NamedTuple):
     The inflow is the axial air speed plus the induced velocity: momentum theory in climb and forward flight (Glauert),
     a fit to measurements in descent, multiplied by the propeller's induced power factor. Sources:
     Leishman, Principles of Helicopter Aerodynamics, section 2.13; time constant of the flow: Carpenter and Fridovich,
-    NACA TN 3044 (1953). Valid for blades that do not stall; updated once per communication step. In the vortex ring
+    NACA TN 3044 (1953). Valid for blades that do not stall; integrated with the motion. In the vortex ring
     state it is the mean flow; `vortex_ring` adds loss and fluctuation.
     """
 
@@ -75,22 +75,27 @@ def _through(e, axial, speed, induced):
 
 
 @kernel
-def _advance_inflow(c, induced, both):
-    """Return the induced velocity an interval later; it approaches that of momentum theory for the present thrust."""
-    e, interval = c
+def _approach(e, induced, both):
+    """Return the rate [m/s^2] at which a rotor's induced velocity approaches that of its present thrust."""
     speed, (axial, across) = both
     square = 0.5 * e.slope / e.area * speed * (e.pitch * speed - _through(e, axial, speed, induced))
     hover = max(math.sqrt(max(square, 0.0)), SLOWEST)
     steady = hover * inflow.induced_velocity(axial / hover, across / hover, e.kappa)
-    gain = 1.0 + 0.25 * e.kappa * e.slope * speed / (e.area * hover)  # the thrust falls as the flow grows
-    rate = 4.0 * e.area * hover / (e.mass * e.kappa) * gain
-    return induced + (1.0 - math.exp(-rate * interval)) / gain * (steady - induced)
+    return 4.0 * e.area * hover / (e.mass * e.kappa) * (steady - induced)
 
 
-@discrete_update(DynamicInflow)
-def follow(e, memory, s, rotors, key, tick, interval):
-    """Return the induced velocity of each rotor for the next interval [m/s]."""
-    return map_tuple(_advance_inflow, (e, interval), memory, map_tuple(pair, 0.0, s.motion.rotor_speed, hub_speeds(s)))
+@memory_rate(DynamicInflow)
+def follow(e, memory, s, rotors):
+    """Return the rate of the induced velocity of each rotor [m/s^2]."""
+    return map_tuple(_approach, e, memory, map_tuple(pair, 0.0, s.motion.rotor_speed, hub_speeds(s)))
+
+
+@decay_rate(DynamicInflow)
+def fastest_approach(e, memory, layout):
+    """Return the rate [1/s] about the strongest thrust at full speed; the thrust falls as the flow grows."""
+    speed = layout.speed_per_volt * layout.max_voltage
+    hover = speed * math.sqrt(0.5 * e.slope / e.area * (1.0 - SLOWEST_FLOW) * e.pitch)
+    return (4.0 * e.area / e.kappa * hover + e.slope * speed) / e.mass
 
 
 @always_inline
@@ -115,12 +120,12 @@ def _reaches(c, reached, both, hub):
     pitch, layout, h = c
     speed, induced = both
     flow, blades = hub[0] + induced, pitch * speed
-    off = min(abs(flow - SLOWEST_FLOW * blades), abs(flow - FASTEST_FLOW * blades))
+    off = min(abs(flow - SLOWEST_FLOW * blades), abs(flow - blades), abs(flow - FASTEST_FLOW * blades))
     return reached or off <= h * (SUDDEN + FASTEST_FLOW * pitch * fastest_spin(layout, speed))
 
 
 @switches(DynamicInflow)
 def reaches_limit(e, memory, s, voltage, h):
-    """Return True unless the flow through every disc stays within its limits, or beyond them."""
+    """Return True if the flow through a disc can reach a limit, or the thrust zero, where its root has no slope."""
     both = map_tuple(pair, 0.0, s.motion.rotor_speed, memory)
     return reduce_tuple(_reaches, (e.pitch, s.layout, h), False, both, hub_speeds(s))

@@ -2,13 +2,7 @@
 
 import math
 
-from lapwing.dynamics.effects._contact_parameters import (
-    STABLE,
-    STABLE_REAL,
-    SUDDEN,
-    GroundContact,
-    GroundContactSmooth,
-)
+from lapwing.dynamics.effects._contact_parameters import STABLE, STABLE_REAL, SUDDEN, GroundContact, GroundContactSmooth
 from lapwing.dynamics.effects._foot_contact import NO_FOOT, contact_of_feet, in_reach, stance_of
 from lapwing.dynamics.effects._hooks import (
     can_sleep,

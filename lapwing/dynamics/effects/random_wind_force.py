@@ -37,8 +37,9 @@ class RandomWindForce(NamedTuple):
 
     Other effects see still air.
 
-    The wind is the mean plus one normal draw per axis and interval; over a communication step the force is held at
-    its mean. Source: Pappalardo et al. 2023, section 6.1. Valid as a disturbance, not as turbulence (`wind_dryden`):
+    The wind is the mean plus one normal draw per axis and interval. The force of a draw is that at the velocity at its
+    start, so it does not depend on a communication step that divides the interval; over a longer one it is held at its
+    mean. Source: Pappalardo et al. 2023, section 6.1. Valid as a disturbance, not as turbulence (`wind_dryden`):
     the draws are independent, so the wind's spectrum is flat (sigma^2 times the interval) up to the interval's
     frequency. The force includes drag, so `body_drag` is rejected in the same scene.
     """
@@ -86,6 +87,8 @@ def draw(e, memory, s, rotors, key, tick, interval):
     start, end = tick * interval / e.interval, (tick + 1) * interval / e.interval  # in draws
     first, last = math.floor(start + ROUNDING), math.ceil(end - ROUNDING) - 1
     if first >= last:
+        if tick > 0 and math.floor((tick - 1) * interval / e.interval + ROUNDING) == first:
+            return memory
         return _blow(e, key, first, s.motion.velocity_world)
     force, drawn = ZERO, ZERO
     for number in range(first, last + 1):

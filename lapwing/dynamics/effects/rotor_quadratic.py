@@ -20,8 +20,8 @@ class RotorQuadratic(NamedTuple):
     the altitude at which the constants were measured.
     """
 
-    thrust_constant: Annotated[float, Gt(0), Le(1)]  # [N s^2/rad^2]
-    torque_constant: Annotated[float, Gt(0), Le(1)]  # [N m s^2/rad^2]
+    thrust_constant: Annotated[float, Gt(0), Le(1)]  # [N s^2/rad^2] thrust over the squared rotor speed
+    torque_constant: Annotated[float, Gt(0), Le(1)]  # [N m s^2/rad^2] torque over the squared rotor speed
 
 
 @always_inline

@@ -20,7 +20,7 @@ class WindDryden(NamedTuple):
 
     Source: MIL-F-8785C, low-altitude model (the spectra of MIL-HDBK-1797 are the same, written with halved lateral and
     vertical scales). Valid from 10 to 1000 feet above the ground; beyond, the values at the limits apply. Sampled
-    exactly once per communication step for the current height and airspeed, and held.
+    exactly every 4 ms (or a communication step, if longer) for the height and airspeed then, linear in between.
     """
 
     conditions: Conditions
@@ -35,18 +35,18 @@ class WindDryden(NamedTuple):
         """Return the effect over the scene's terrain."""
         return WindDryden(self.conditions._replace(terrain=environment.terrain))
 
-    def initial_discrete_state(self) -> tuple[tuple, Vec3, float]:
-        """Return the states of the parts, the wind, and 1 once started."""
+    def initial_discrete_state(self) -> tuple[tuple, tuple[Vec3, Vec3], float]:
+        """Return the states of the parts, the wind with its slope, and the time of the last sample."""
         return calm(self.parts)
 
 
 @discrete_update(WindDryden)
 def draw(e, memory, s, rotors, key, tick, interval):
-    """Return the states of the parts, the wind [m/s, world] for the next interval, and 1: started."""
+    """Return the states of the parts, the wind [m/s, world] with its slope, and the time [s] of the last sample."""
     return drawn(e, memory, s, key, tick, interval)
 
 
 @air(WindDryden)
 def wind_dryden(e, memory, s, before):
     """Add the turbulence to the air."""
-    return add_to_air(memory, before)
+    return add_to_air(memory, s, before)

@@ -10,21 +10,25 @@ from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.effects._hooks import air, air_rate, discrete_update
 from lapwing.dynamics.effects._turbulence import (
     KIND,
+    NOT_STARTED,
     Conditions,
+    add_to_air,
     advance_filters,
     conditions,
     deviation_and_rate,
     first_order,
     in_world,
     intensity,
+    next_line,
+    on_line,
     surroundings,
-    time_since_update,
+    ticks_per_sample,
+    time_to_sample,
 )
 from lapwing.dynamics.effects._turbulence import Settings as Turbulence
-from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.noise import normal3
-from lapwing.dynamics.vector import ZERO, Vec3, add, apply_transposed, scale
+from lapwing.dynamics.vector import ZERO, add, apply_transposed, scale
 from lapwing.kernels import always_inline, math
 
 __all__ = ["KIND", "Settings", "WindDrydenRates"]
@@ -49,8 +53,7 @@ class WindDrydenRates(NamedTuple):
     """Gusts of `wind_dryden`, bit-for-bit identical, and angular rates of the air (theory, eq. (2.39)).
 
     The rates change the air velocity at the rotor hubs. Source: MIL-F-8785C, section 3.7.5: p has its own filter, q and
-    r follow from the passing transverse gusts. Valid as `wind_dryden`. Sampled exactly once per communication step, and
-    held.
+    r follow from the passing transverse gusts. Valid and sampled as `wind_dryden`.
     """
 
     conditions: Conditions
@@ -69,9 +72,9 @@ class WindDrydenRates(NamedTuple):
         """Return the effect over the scene's terrain."""
         return self._replace(conditions=self.conditions._replace(terrain=environment.terrain))
 
-    def initial_discrete_state(self) -> tuple[tuple[float, ...], Vec3, tuple[float, float, float], Vec3]:
-        """Return the state of `wind_dryden`, states of roll, pitch and yaw, and the air's rate [rad/s, world]."""
-        return (0.0, 0.0, 0.0, 0.0, 0.0, 0.0), ZERO, (0.0, 0.0, 0.0), ZERO
+    def initial_discrete_state(self) -> tuple:
+        """Return the state of `wind_dryden`, states of roll, pitch and yaw, and the air's rate with its slope."""
+        return (0.0, 0.0, 0.0, 0.0, 0.0), (ZERO, ZERO), NOT_STARTED, (0.0, 0.0, 0.0), (ZERO, ZERO)
 
 
 @always_inline
@@ -116,13 +119,19 @@ def low_pass(x1, x2, z, beta, theta, n1, n2, n3):
 
 @discrete_update(WindDrydenRates)
 def draw(e, memory, s, rotors, key, tick, interval):
-    """Return the filter states, the wind [m/s, world] and the air's rate [rad/s, world] for the next interval."""
-    along, across1, across2, up1, up2, started = memory[0]
-    roll, pitch, yaw = memory[2]
+    """Return the filter states, and the wind [m/s, world] and the air's rate [rad/s, world] with their slopes."""
+    every = ticks_per_sample(interval)
+    last = memory[2]
+    started = last >= 0.0
+    if started and tick % every != 0:
+        return memory
+    period, now, number = every * interval, tick * interval, tick // every
+    _, across1, across2, up1, up2 = memory[0]
+    roll, pitch, yaw = memory[3]
     sigma, rate = deviation_and_rate(e.conditions, s)
-    time = time_since_update(started, rate, interval)
-    first, second = normal3(key, tick, FIRST), normal3(key, tick, SECOND)
-    third = normal3(key, tick, LANE)
+    time = time_to_sample(started, rate, period)
+    first, second = normal3(key, number, FIRST), normal3(key, number, SECOND)
+    third = normal3(key, number, LANE)
     altitude, airspeed = surroundings(e.conditions, s)
     _, length = intensity(e.conditions.wind_speed, altitude)
     per_span = math.pi / (4.0 * e.span)  # [1/m] of roll and pitch; four thirds of it of yaw
@@ -130,21 +139,23 @@ def draw(e, memory, s, rotors, key, tick, interval):
     roll = first_order(roll, per_span * airspeed * time, third[0])
     pitch = low_pass(up1, up2, pitch, beta_up, rate[2] * time, first[2], second[1], third[1])
     yaw = low_pass(across1, across2, yaw, beta_across, rate[1] * time, first[1], second[0], third[2])
-    states, (u, v, w) = advance_filters((along, across1, across2, up1, up2), scale(time, rate), first, second)
+    states, (u, v, w) = advance_filters(memory[0], scale(time, rate), first, second)
     wind = in_world(e.conditions, sigma[0] * u, sigma[1] * v, sigma[2] * w)
     p = sigma[2] * math.pi * math.sqrt(0.1 * math.cbrt(per_span * length[2]) / (e.span * length[2])) * roll
     q, r = per_span * sigma[2] * (w - pitch), -4.0 / 3.0 * per_span * sigma[1] * (v - yaw)
     rotation = in_world(e.conditions, p, q, r)
-    return (states[0], states[1], states[2], states[3], states[4], 1.0), wind, (roll, pitch, yaw), rotation
+    wind_line = next_line(memory[1], last, now, started, wind, period)
+    rate_line = next_line(memory[4], last, now, started, rotation, period)
+    return states, wind_line, now, (roll, pitch, yaw), rate_line
 
 
 @air(WindDrydenRates)
 def wind_dryden_rates(e, memory, s, before):
     """Add the turbulence to the air."""
-    return Air(before.density, add(before.wind_world, memory[1]))
+    return add_to_air(memory, s, before)
 
 
 @air_rate(WindDrydenRates)
 def add_gust_rate(e, memory, s, before):
     """Add the turbulence's rate to the air's rate [rad/s], body coordinates."""
-    return add(before, apply_transposed(s.R_world_body, memory[3]))
+    return add(before, apply_transposed(s.R_world_body, on_line(memory[4], s.t - memory[2])))

@@ -191,11 +191,7 @@ def accelerations(
 
 
 def as_float_arrays(
-    system: System,
-    configuration: ArrayLike,
-    velocity: ArrayLike,
-    wrench: ArrayLike | None,
-    drive: ArrayLike | None,
+    system: System, configuration: ArrayLike, velocity: ArrayLike, wrench: ArrayLike | None, drive: ArrayLike | None
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the arguments of `accelerations` as arrays of floats, zeros for None.
 

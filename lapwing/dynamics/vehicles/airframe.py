@@ -5,12 +5,12 @@ import tomllib
 from pathlib import Path
 
 import numpy as np
-from pydantic import ValidationError, model_validator
+from pydantic import Field, model_validator
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._types import steiner
 from lapwing.dynamics.input_file import read_text, unreadable
-from lapwing.dynamics.validation import fault
+from lapwing.dynamics.validation import validated
 from lapwing.dynamics.vehicles.airframe_tables import (
     Battery,
     CarriedBox,
@@ -18,6 +18,7 @@ from lapwing.dynamics.vehicles.airframe_tables import (
     Drag,
     Mass,
     Motor,
+    Posterior,
     Propeller,
     Published,
     RotorPlacement,
@@ -42,6 +43,7 @@ class Airframe(Section):
     drag: Drag | None = None
     payload: CarriedBox | None = None
     published: Published | None = None
+    posterior: Posterior | None = Field(default=None, exclude=True)  # for campaigns, not part of a flight
 
     @model_validator(mode="after")
     def _one_payload(self) -> "Airframe":
@@ -116,10 +118,10 @@ def load_airframe(path: str | Path) -> Airframe:
     """
     path = Path(path)
     try:
-        return Airframe.model_validate(tomllib.loads(read_text(path)))
+        return validated(Airframe.model_validate, tomllib.loads(read_text(path)), Airframe)
     except OSError as error:
         raise unreadable(path, error, "an airframe file (.toml)") from None
-    except ValidationError as error:
-        raise ValueError(f"{path}: {fault(error, Airframe)}") from None
+    except ConfigError as error:
+        raise ValueError(f"{path}: {error}") from None
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise ValueError(f"{path}: not valid TOML: {error}") from None

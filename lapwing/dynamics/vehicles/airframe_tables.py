@@ -61,7 +61,7 @@ class Mass(Section):
 class CarriedBox(Section):
     """Payload as a uniform box, in addition to the mass properties of the vehicle without it."""
 
-    mass: Positive  # [kg]
+    mass: Positive  # [kg] of the box
     position: Triple  # [m] position of its centre, body
     size: PositiveTriple  # [m] size along body x, y, z
 
@@ -169,7 +169,7 @@ class Battery(Section):
     """Lithium-polymer battery."""
 
     cells: Annotated[int, Gt(0)]  # number of cells in series
-    capacity: Positive  # [A s]
+    capacity: Positive  # [A s] charge of the full battery
     c_rating: Positive  # [1/h] maximum current over capacity in A h
     cell_resistance: NotNegative  # [ohm] of one cell
 
@@ -192,6 +192,26 @@ class Drag(Section):
     area: PositiveTriple  # [m^2] drag coefficient times area, along body x, y, z
 
 
+class Posterior(Section):
+    """Joint distribution of estimated parameters, written by `lapwing identify`; `lapwing campaign --vary` reads it."""
+
+    keys: tuple[str, ...]  # of the scene
+    distributions: tuple[Literal["normal", "lognormal"], ...]  # of each key
+    mean: tuple[float, ...]  # in the unit of the key
+    covariance: tuple[tuple[float, ...], ...]  # in the units of the keys
+    correlations: tuple[tuple[float, ...], ...]  # follow from the covariance
+
+    @model_validator(mode="after")
+    def _same_size(self) -> "Posterior":
+        count = len(self.keys)
+        rows = (self.distributions, self.mean, self.covariance, self.correlations, *self.covariance, *self.correlations)
+        if not count or any(len(row) != count for row in rows):
+            raise ConfigError("keys", f"got {count}", "at least one, and as many entries in all other lists")
+        if any(row[k] <= 0.0 for k, row in enumerate(self.covariance)):
+            raise ConfigError("covariance", "a variance is not above 0", "positive numbers on the diagonal")
+        return self
+
+
 class PublishedFigure(Section):
     """Published figure, and the reason why the computed one may differ."""
 
@@ -203,9 +223,9 @@ class Published(Section):
     """Published performance of this vehicle; not used in computations."""
 
     source: str  # source of the figures
-    hover_time: PublishedFigure | None = None  # [s]
-    maximum_payload: PublishedFigure | None = None  # [kg]
-    maximum_range: PublishedFigure | None = None  # [m]
-    ceiling: PublishedFigure | None = None  # [m]
-    maximum_tilt: PublishedFigure | None = None  # [rad]
-    maximum_speed: PublishedFigure | None = None  # [m/s]
+    hover_time: PublishedFigure | None = None  # [s] flight time in hover
+    maximum_payload: PublishedFigure | None = None  # [kg] mass that it lifts
+    maximum_range: PublishedFigure | None = None  # [m] distance on one charge
+    ceiling: PublishedFigure | None = None  # [m] largest altitude
+    maximum_tilt: PublishedFigure | None = None  # [rad] largest tilt in level flight
+    maximum_speed: PublishedFigure | None = None  # [m/s] largest speed in level flight

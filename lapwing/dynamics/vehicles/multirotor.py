@@ -23,7 +23,8 @@ from lapwing.dynamics.vehicles.multirotor_equations import (
     evaluate,
     motion_of,
 )
-from lapwing.dynamics.vehicles.multirotor_stepper import begin, parts, steps, within
+from lapwing.dynamics.vehicles.multirotor_stepper import begin, steps, within
+from lapwing.dynamics.vehicles.step_bound import parts
 from lapwing.kernels import kernel
 from lapwing.kernels.codegen import map_tuple
 
@@ -55,7 +56,7 @@ class MultirotorObservation(NamedTuple):
 def advance(method, p, key, tick, state, command, h, n):
     """Return the state a communication step later: n steps of length h [s] under constant voltages.
 
-    Steps are split if the motors' lag is too fast for them.
+    Steps are split if a damping or the rotation is too fast for them (`step_bound`).
 
     Args:
         method: `Method()` of an integrator's module.
@@ -70,7 +71,7 @@ def advance(method, p, key, tick, state, command, h, n):
     interval = n * h
     start = tick * interval
     drive = begin(p, key, tick, state, command, interval)
-    split = parts(p.layout, h)
+    split = parts(p, motion_of(p.layout, state.motion), drive.memory, h)
     x, memory = steps(method, drive, state.motion, start, start + interval, h / split, 0, n * split)
     return MultirotorState(x, memory)
 
@@ -84,7 +85,8 @@ def observe(p, tick, interval, state, command):
     drive = MultirotorDrive(p, body, state.memory, voltage)
     s, rotors, _, _ = evaluate(drive, tick * interval, motion_of(layout, state.motion))
     linear, angular = accelerations_of_form(drive, tick * interval, state.motion)
-    unknown = (math.nan, layout.max_voltage, total(rotors.current), math.nan)
+    # without a battery, a source of constant voltage delivers the power of the motors
+    source = (math.nan, layout.max_voltage, total(rotors.power) / layout.max_voltage, math.nan)
     return MultirotorObservation(
         linear,
         angular,
@@ -98,7 +100,7 @@ def observe(p, tick, interval, state, command):
         hooks.all_winds(p.effects, state.memory, s.air.wind_world),
         s.body.mass,
         hooks.all_contacts(p.effects, state.memory, s),
-        hooks.all_battery_states(p.effects, state.memory, unknown),
+        hooks.all_battery_states(p.effects, state.memory, total(rotors.power), source),
     )
 
 

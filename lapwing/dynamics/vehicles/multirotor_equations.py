@@ -10,6 +10,7 @@ from typing import Any, NamedTuple
 
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.effects._axes import thrust_wrench
+from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.dynamics.effects._types import (
     Air,
     AnyMassProperties,
@@ -24,10 +25,11 @@ from lapwing.dynamics.integrators import CompensatedSummation
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import ZERO, Vec3, product
 from lapwing.dynamics.vehicles.newton_euler import newton_euler
-from lapwing.kernels import DispatchTable, always_inline
-from lapwing.kernels.codegen import generic, map_tuple
+from lapwing.kernels import DispatchTable, always_inline, noinline
+from lapwing.kernels.codegen import generic, map_tuple, reduce_tuple
 
 PLAIN_TOLERANCE = 1e-13  # below it, the error of plain sums of the parts of a step can exceed the accuracy
+ROUNDING, MOST_ROUNDS = 1e-14, 16  # relative to the battery's voltage; of the iteration for it
 STANDARD_DENSITY = 1.225  # [kg/m^3] default without an effect: 15 degC, 1 atm
 
 
@@ -109,6 +111,80 @@ def _static_current(s, torque, voltage):
 
 
 @always_inline
+def _motors(drive, s, loads, voltage):
+    """Return (acceleration [rad/s^2], current [A], power [W]) of each rotor under its voltage [V]."""
+    current = map_tuple(_static_current, s, loads.torque, voltage)
+    lag = (map_tuple(_lag, s, s.motion.rotor_speed, voltage), current, map_tuple(product, 0.0, voltage, current))
+    return hooks.all_motors(drive.parameters.effects, drive.memory, s, loads, voltage, lag)
+
+
+@always_inline
+def _at_most(limit, voltage, _):
+    return min(voltage, limit)
+
+
+@always_inline
+def _higher(_, highest, voltage, __):
+    return max(highest, voltage)
+
+
+@always_inline
+def _excess(drive, s, loads, voltage):
+    """Return by how much [V] the battery's voltage under the motors' power at a supply of `voltage` is above it."""
+    power = total(_motors(drive, s, loads, map_tuple(_at_most, voltage, drive.voltage, drive.voltage))[2])
+    return hooks.battery_voltage(drive.parameters.effects, drive.memory, power) - voltage
+
+
+@noinline
+def _limited_voltage(drive, s, loads, a):
+    """Return the battery's voltage [V] under the power of motors that it limits; `a`: its voltage without load [V].
+
+    The power grows with the voltage, so the root lies between the voltages without load and under the power for it.
+    """
+    at_a = _excess(drive, s, loads, a)
+    b, rounding = a + at_a, ROUNDING * a
+    at_b = _excess(drive, s, loads, b)
+    for _ in range(MOST_ROUNDS):
+        if abs(at_b) <= rounding:
+            break
+        c = b - at_b * ((b - a) / (at_b - at_a))
+        at_c = _excess(drive, s, loads, c)
+        if at_c * at_b < 0.0:
+            a, at_a = b, at_b
+        else:  # the rule of false position converges from both sides with half the value at the other end (Illinois)
+            at_a *= 0.5
+        b, at_b = c, at_c
+    return b
+
+
+@always_inline
+def _limited_by_battery(drive, s, loads):
+    """Return the voltages [V] of the motors, none above that of the battery under their power (theory, eq. (2.10))."""
+    highest = reduce_tuple(_higher, None, 0.0, drive.voltage, drive.voltage)
+    if _excess(drive, s, loads, highest) >= 0.0:
+        return drive.voltage
+    limit = _limited_voltage(drive, s, loads, hooks.battery_voltage(drive.parameters.effects, drive.memory, 0.0))
+    return map_tuple(_at_most, limit, drive.voltage, drive.voltage)
+
+
+@always_inline
+def _commanded(drive, s, loads):
+    return drive.voltage
+
+
+@generic(inline=True)
+def _supplied(effects, drive, s, loads):
+    """Return the voltage [V] of each motor."""
+    supplied = _limited_by_battery if has_battery(effects) else _commanded
+    return lambda effects, drive, s, loads: supplied(drive, s, loads)
+
+
+def has_battery(effects: Any) -> bool:
+    """Return True if an effect limits the motors' voltages, by the type of the tuple of effects."""
+    return any(e.instance_class in hooks.HOOKS["terminal_voltage"] for e in effects.types)
+
+
+@always_inline
 def _constant(c, a, b):
     return c
 
@@ -135,10 +211,8 @@ def evaluate(drive, t, motion):
     one, zero = map_tuple(_constant, 1.0, speed, speed), map_tuple(_constant, -0.0, speed, speed)
     factors = hooks.all_load_factors(p.effects, memory, s, Factors(one, one))
     loads = hooks.all_loads(p.effects, memory, s, factors, Loads(zero, zero))
-    voltage = hooks.all_supply_voltage(p.effects, memory, drive.voltage)
-    current = map_tuple(_static_current, s, loads.torque, voltage)
-    lag = (map_tuple(_lag, s, speed, voltage), current, map_tuple(product, 0.0, voltage, current))
-    acceleration, current, power = hooks.all_motors(p.effects, memory, s, loads, voltage, lag)
+    voltage = _supplied(p.effects, drive, s, loads)
+    acceleration, current, power = _motors(drive, s, loads, voltage)
     rotors = Rotors(loads.thrust, loads.torque, acceleration, current, voltage, power)
     thrust, torque = thrust_wrench(layout, loads)
     torque = hooks.all_torques(p.effects, memory, s, rotors, torque)

@@ -6,6 +6,7 @@ from typing import Any, NamedTuple
 
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.effects import _stiff_effects as stiff_effects
+from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.dynamics.integrators import (
     SHORTEST,
     CompensatedSum,
@@ -23,16 +24,17 @@ from lapwing.dynamics.vehicles.multirotor_equations import (
     StateForm,
     accelerations_of_form,
     evaluate,
+    has_battery,
     inputs,
     motion_of,
 )
 from lapwing.kernels import always_inline, kernel
 from lapwing.kernels import noinline as never_inlined
-from lapwing.kernels.codegen import generic, map_tuple
+from lapwing.kernels.codegen import generic, map_tuple, reduce_tuple
 from lapwing.kernels.state_tree import finite, relative_difference
 
 BREAK_ROUNDING = 1e-6  # relative to a communication step: breakpoints this close to its ends count as the ends
-FASTEST_LAG = 1.0  # largest product of lag rate and step without substeps: every explicit method is stable up to 2
+SAG_RATE = 4.0  # largest relative rate of the battery's sag, over the rate of the motors' lag
 
 
 @generic(inline=True)
@@ -62,12 +64,34 @@ def _form_switches(layout, x, h):
 
 
 @always_inline
+def _near(c, near, voltage, _):
+    limit, reach = c
+    return near or abs(voltage - limit) <= reach
+
+
+@generic(inline=True)
+def _supply(effects, drive, t, motion, h):
+    """Return (inputs, voltage [V] of each motor, True if the battery can begin or cease to limit one within h [s])."""
+    if not has_battery(effects):
+        return lambda effects, drive, t, motion, h: (inputs(drive, t, motion), drive.voltage, False)
+
+    def supply(effects, drive, t, motion, h):
+        s, rotors, _, _ = evaluate(drive, t, motion)
+        limit = hooks.battery_voltage(effects, drive.memory, total(rotors.power))
+        sag = abs(hooks.battery_voltage(effects, drive.memory, 0.0) - limit)
+        near = limit, SAG_RATE * s.layout.lag_rate * h * sag
+        return s, rotors.voltage, reduce_tuple(_near, near, False, drive.voltage, drive.voltage)
+
+    return supply
+
+
+@always_inline
 def switches(drive, t, x, h):
     """Return True if the loads can have a state-dependent jump or kink within h [s] after t [s]."""
     p, seen = drive.parameters, motion_of(drive.parameters.layout, x)
-    voltage = hooks.all_supply_voltage(p.effects, drive.memory, drive.voltage)
-    s = inputs(drive, t, seen)
-    return _form_switches(p.layout, x, h) or hooks.all_switches(p.effects, drive.memory, s, voltage, h)
+    s, voltage, limiting = _supply(p.effects, drive, t, seen, h)
+    own = _form_switches(p.layout, x, h) or limiting
+    return own or hooks.all_switches(p.effects, drive.memory, s, voltage, h)
 
 
 @always_inline
@@ -87,7 +111,7 @@ def _airborne(p, body, memory, voltage):
 
 
 class AwakeState(NamedTuple):
-    """Motion with the memories of effects that have a rate: a form while a stiff effect is awake."""
+    """Motion with the memories of effects that have a rate: a form of the state during a step."""
 
     motion: Any  # an instance of another class in FORMS
     memory: tuple
@@ -115,12 +139,27 @@ def _with_memories(drive, x):
     return MultirotorDrive(p, body, stiff_effects.with_integrated(p.effects, memory, x.memory), voltage)
 
 
+@generic(inline=True)
+def _memory_rates(effects, stiff, drive, t, motion):
+    """Return the rates of all memories that have one; `drive` has the wrenches that `stiff` belongs to."""
+    if not stiff_effects.have_memory_rate(effects):
+        return lambda effects, stiff, drive, t, motion: stiff_effects.all_rates(effects, drive.memory, stiff, t, t)
+
+    def rates(effects, stiff, drive, t, motion):
+        s, rotors, _, _ = evaluate(drive, t, motion)  # the same numbers as in the rate of the motion
+        return stiff_effects.all_rates(effects, drive.memory, stiff, s, rotors)
+
+    return rates
+
+
 @kernel
 def _awake_rate(drive, t, x):
     p, body, memory, voltage = _with_memories(drive, x)
-    effects, rates = stiff_effects.with_rates(p.effects, memory, motion_of(p.layout, x.motion))
+    motion = motion_of(p.layout, x.motion)
+    effects, stiff = stiff_effects.with_wrenches(p.effects, memory, motion)
     parameters = MultirotorParameters(p.body, p.layout, effects, p.tolerance, p.summation)
-    return AwakeState(_rate_of_form(MultirotorDrive(parameters, body, memory, voltage), t, x.motion), rates)
+    known = MultirotorDrive(parameters, body, memory, voltage)
+    return AwakeState(_rate_of_form(known, t, x.motion), _memory_rates(p.effects, stiff, known, t, motion))
 
 
 @always_inline
@@ -199,16 +238,26 @@ def begin(p, key, tick, state, command, interval):
     return MultirotorDrive(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, voltage)
 
 
-@always_inline
-def parts(layout, h):
-    """Return the number of substeps of a step of h [s] for the motors' lag."""
-    return max(1, math.ceil(h * layout.lag_rate / FASTEST_LAG))
+@generic(inline=True)
+def _step_with_memories(effects, method, drive, t, x, h):
+    """Return (motion, memory) a step later."""
+    if not stiff_effects.have_memory_rate(effects):
+        return lambda effects, method, drive, t, x, h: (_step(method, drive, t, x, h), drive.memory)
+
+    def step(effects, method, drive, t, x, h):
+        y = _step(method, drive, t, AwakeState(x, stiff_effects.all_integrated(effects, drive.memory)), h)
+        return y.motion, stiff_effects.with_integrated(effects, drive.memory, y.memory)
+
+    return step
 
 
 @always_inline
 def airborne_step(method, drive, t, x, h):
-    """Return the motion a step later, without the effects that can sleep."""
-    return _step(method, _airborne(drive.parameters, drive.body, drive.memory, drive.voltage), t, x, h)
+    """Return (motion, memory) a step later, without the effects that can sleep."""
+    p, body, memory, voltage = drive
+    airborne = _airborne(p, body, memory, voltage)
+    x, awake = _step_with_memories(airborne.parameters.effects, method, airborne, t, x, h)
+    return x, stiff_effects.with_awake(p.effects, memory, awake)
 
 
 @always_inline
@@ -236,19 +285,17 @@ def steps(method, drive, x, start, end, h, first, n):
             n = max(1, math.ceil((stop - start) / longest - BREAK_ROUNDING))
             h = (stop - start) / n
         until = min(stop, end)
-        layout, airborne = p.layout, _airborne(p, body, memory, voltage)
         for i in range(first, n):
-            seen = motion_of(layout, x)
-            switching = switches(MultirotorDrive(p, body, memory, voltage), start + i * h, x, h)
+            seen, drive = motion_of(p.layout, x), MultirotorDrive(p, body, memory, voltage)
+            switching = switches(drive, start + i * h, x, h)
             asleep = hooks.all_sleeping(p.effects, memory, seen, h) and hooks.all_can_sleep(p.effects, memory)
             if asleep and not switching:
-                x = _step(method, airborne, start + i * h, x, h)
+                x, memory = airborne_step(method, drive, start + i * h, x, h)
                 continue
             if switching or not stiff_effects.all_stiff_sleeping(p.effects, memory, seen, h):
-                drive = MultirotorDrive(p, body, memory, voltage)
                 x, memory = _stiff_steps(method, drive, start + i * h, x, h, until)
                 break
-            x = _step(method, MultirotorDrive(p, body, memory, voltage), start + i * h, x, h)
+            x, memory = _step_with_memories(p.effects, method, drive, start + i * h, x, h)
         if not stop < end:
             return x, memory
         memory = hooks.all_timed_updates(p.effects, memory, stop)

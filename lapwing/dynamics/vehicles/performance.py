@@ -7,7 +7,7 @@ lower ones (eq. (2.44)), with all rotors at one speed.
 """
 
 import math
-from typing import NamedTuple
+from typing import Literal, NamedTuple
 
 from scipy.optimize import brentq, minimize_scalar
 
@@ -148,7 +148,14 @@ def _electrics(motor: Motor, speed: float, torque: float) -> tuple[float, float]
 
 
 def maximum_thrust(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:
-    """Return the maximum thrust of all rotors in still air [N], limited by voltage, current or power.
+    """Return the maximum thrust of all rotors in still air [N]; see `limited_thrust`."""
+    return limited_thrust(airframe, density, rotor)[0]
+
+
+def limited_thrust(
+    airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None
+) -> tuple[float, Literal["voltage", "current", "power"]]:
+    """Return (maximum thrust of all rotors in still air [N], what limits it).
 
     Raises:
         ValueError: the current without load alone exceeds a limit.
@@ -159,15 +166,17 @@ def maximum_thrust(airframe: Airframe, density: float = DENSITY, rotor: Rotor | 
     k_thrust += sum(gain.thrust for gain in gains) / count
     k_torque += max(gain.torque for gain in gains)
 
-    def excess(omega: float) -> float:
-        """Return the largest relative excess of voltage, current and power over their limits."""
+    def used(omega: float) -> dict[Literal["voltage", "current", "power"], float]:
+        """Return voltage, current and power over their limits."""
         voltage, current = _electrics(motor, omega, k_torque * omega**2)
-        used = (
-            voltage / motor.max_voltage,
-            current / airframe.motor_current_limit,
-            voltage * current / motor.power_limit,
-        )
-        return max(used) - 1.0
+        return {
+            "voltage": voltage / motor.max_voltage,
+            "current": current / airframe.motor_current_limit,
+            "power": voltage * current / motor.power_limit,
+        }
+
+    def excess(omega: float) -> float:
+        return max(used(omega).values()) - 1.0
 
     if excess(0.0) > 0.0:
         voltage, current = _electrics(motor, 0.0, 0.0)
@@ -177,7 +186,8 @@ def maximum_thrust(airframe: Airframe, density: float = DENSITY, rotor: Rotor | 
             + " and ".join(f"{limit:.3g} {unit}" for limit, unit in limits.items() if math.isfinite(limit))
         )
     highest = brentq(excess, 0.0, motor.max_voltage / motor.rotor_constant)
-    return _lift(airframe) * k_thrust * highest**2
+    shares = used(highest)
+    return _lift(airframe) * k_thrust * highest**2, max(shares, key=shares.__getitem__)
 
 
 def thrust_over_weight(airframe: Airframe, density: float = DENSITY, rotor: Rotor | None = None) -> float:

@@ -2,6 +2,7 @@
 
 from typing import TYPE_CHECKING
 
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.kernels import math
 
 if TYPE_CHECKING:  # services do not import pydantic
@@ -58,7 +59,7 @@ def from_stand(
         torque: [N m] at that speed.
 
     Raises:
-        ValueError: no propeller of this geometry has these values.
+        ConfigError: no propeller of this geometry has these values.
     """
     n = speed / (2.0 * math.pi)
     full = propeller.model_copy(update={"lift_correction": 1.0})
@@ -68,17 +69,13 @@ def from_stand(
     drag = 8.0 * propeller.aspect_ratio * torque / power / (math.square(math.pi) * weight)
     zero_lift_drag = drag - drag_coefficients(propeller)[1]
     if lift_correction > 1.0:
-        most = thrust / lift_correction
-        raise ValueError(
-            f"{thrust:g} N at {speed:g} rad/s is more than the {most:.3g} N that a propeller of this geometry can "
-            "produce; expected a higher speed, or a downwash_factor nearer 1"
-        )
+        message = f"{thrust:g} N at {speed:g} rad/s is more than a propeller of this geometry can produce"
+        expected = f"at most {thrust / lift_correction:.3g} N, a higher speed or pitch, or a downwash_factor nearer 1"
+        raise ConfigError("thrust", message, expected)
     if zero_lift_drag < 0.0:
         least = torque * drag_coefficients(propeller)[1] / drag
-        raise ValueError(
-            f"{torque:g} N m at {speed:g} rad/s is less than the {least:.3g} N m that this thrust needs; "
-            "expected a larger torque, or less thrust"
-        )
+        message = f"{torque:g} N m at {speed:g} rad/s is less than a thrust of {thrust:g} N needs"
+        raise ConfigError("torque", message, f"at least {least:.3g} N m, or less thrust")
     return lift_correction, zero_lift_drag
 
 

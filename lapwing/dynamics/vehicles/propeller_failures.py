@@ -8,9 +8,15 @@ from numba import types
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.multibody.five_bodies import FiveBodies
 from lapwing.dynamics.vehicles import multirotor_euler
-from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters, MultirotorState
+from lapwing.dynamics.vehicles.multirotor_equations import (
+    MultirotorDrive,
+    MultirotorParameters,
+    MultirotorState,
+    motion_of,
+)
 from lapwing.dynamics.vehicles.multirotor_multibody_equations import apply_constraint_impulse
-from lapwing.dynamics.vehicles.multirotor_stepper import BREAK_ROUNDING, begin, parts, steps
+from lapwing.dynamics.vehicles.multirotor_stepper import BREAK_ROUNDING, begin, steps
+from lapwing.dynamics.vehicles.step_bound import parts
 from lapwing.kernels import kernel
 from lapwing.kernels.codegen import generic
 
@@ -53,7 +59,7 @@ def advance_through(method, p, failures, key, tick, state, command, h, n):
         p, state = failures[k].vehicle, MultirotorState(x, state.memory)
         k += 1
     drive, x = begin(p, key, tick, state, command, interval), state.motion
-    split, whole = parts(p.layout, h), k == count
+    split, whole = parts(p, motion_of(p.layout, x), drive.memory, h), k == count
     size, number, longest = h / split, n * split, h / split
     while True:
         until = failures[k].time if k < count else end

@@ -7,6 +7,10 @@ code that LLVM receives. After inlining both conventions lead to equal code.
 # numba.core.types fills itself at import
 # mypy: disable-error-code="attr-defined"
 
+import itertools
+import os
+import re
+import uuid
 from collections.abc import Sequence
 from functools import cache
 from typing import Any, NamedTuple
@@ -20,6 +24,28 @@ from numba.core.lowering import Lower
 WIDEST = '"prefer-vector-width"="512"'  # by default LLVM uses half of the vector registers of Intel processors
 CACHE_LINE = 64  # [bytes] alignment of the stack, so that no vector there is in two cache lines
 WHOLE = ".whole"  # suffix of the names of functions with this convention
+
+_count = itertools.count()
+
+
+@cache
+def _process(pid: int) -> str:
+    return uuid.uuid4().hex
+
+
+def unique(name: str) -> str:
+    """Return a name that no other function has, in any process.
+
+    LLVM uses the first definition of a name in all modules that it links or a process loads, and these are compiled by
+    several processes. numba's names hold the names of classes without their modules, and a number that counts the
+    functions of one process.
+    """
+    return f"{name}.{_process(os.getpid())}.{next(_count)}"
+
+
+def has_unique_name(symbol: str) -> bool:
+    """Return True if `unique` made a name."""
+    return re.search(r"\.[0-9a-f]{32}\.", symbol) is not None
 
 
 class _Whole:
@@ -118,7 +144,16 @@ def _holds_arrays(models: Any, kind: types.Type) -> bool:
 
 
 class KernelLower(Lower):
-    """Numba's lowering without reference counting of tuples that hold no arrays."""
+    """Numba's lowering with unique names, without reference counting of tuples that hold no arrays."""
+
+    def __init__(self, context: Any, library: Any, fndesc: Any, interp: Any, **more: Any):
+        if not any(isinstance(t, types.RecursiveCall) for t in fndesc.typemap.values()):  # known by its name
+            fndesc.mangled_name = unique(fndesc.mangled_name) + self._convention(fndesc, interp)
+        super().__init__(context, library, fndesc, interp, **more)
+
+    def _convention(self, fndesc: Any, interp: Any) -> str:
+        """Return the end of the name, which stands for the calling convention."""
+        return ""
 
     def setup_function(self, fndesc: Any) -> None:
         """Write the start of the function."""
@@ -144,11 +179,9 @@ class KernelLower(Lower):
 class InnerLower(KernelLower):
     """Lowering of an inner function, called by `ValueCallConv` unless it needs numba's own convention."""
 
-    def __init__(self, context: Any, library: Any, fndesc: Any, interp: Any, **more: Any):
-        special = isinstance(fndesc.restype, types.Optional) or interp.generator_info is not None
-        if not special and not any(isinstance(t, types.RecursiveCall) for t in fndesc.typemap.values()):
-            fndesc.mangled_name += WHOLE
-        super().__init__(context, library, fndesc, interp, **more)
+    def _convention(self, fndesc: Any, interp: Any) -> str:
+        """Return the end of the name, which stands for the calling convention."""
+        return "" if isinstance(fndesc.restype, types.Optional) or interp.generator_info is not None else WHOLE
 
     @property
     def call_conv(self) -> CPUCallConv:

@@ -9,6 +9,8 @@ from numba.core import config
 from numba.core.codegen import JITCodeLibrary
 from numba.core.environment import lookup_environment
 
+from lapwing.kernels.compiler.call_convention import has_unique_name, unique
+
 _ALLOCATORS = ("NRT_Allocate", "NRT_MemInfo_alloc", "NRT_MemInfo_new", "NRT_MemInfo_varsize_alloc")
 _COUNTERS = ("NRT_incref", "NRT_decref")
 _SHARED = (binding.Linkage.linkonce_odr, binding.Linkage.weak_odr)
@@ -60,6 +62,7 @@ class KernelLibrary(JITCodeLibrary):
         """Link a library, or declare its function if that is `noinline`, so that LLVM optimises it once."""
         library._ensure_finalized()
         self._noinline |= getattr(library, "_noinline", {})
+        self._dynamic_globals += library._dynamic_globals  # code with addresses of this process is not stored
         if not isinstance(library, InnerLibrary):
             super().add_linking_library(library)
         elif library.noinline:
@@ -108,6 +111,13 @@ class KernelLibrary(JITCodeLibrary):
             manager, builder = codegen._module_pass_manager(**options)
             _run(manager, self._final_module, builder)
 
+    def _make_names_unique(self) -> None:
+        """Rename the functions of numba that are not inlined. See `call_convention.unique`."""
+        for function in self._final_module.functions:
+            is_numba = function.name.startswith("_ZN") and not has_unique_name(function.name)
+            if is_numba and not function.is_declaration and function.linkage in _SHARED:
+                function.name = unique(function.name)
+
     def _optimize_functions(self, module: Any) -> None:
         """Run the function passes. numba also creates a pass manager for declarations, which takes most of the time."""
         module.data_layout = self._codegen._data_layout
@@ -135,6 +145,7 @@ class KernelLibrary(JITCodeLibrary):
             inliner = binding.create_new_module_pass_manager()
             inliner.add_always_inliner_pass()
             _run(inliner, self._final_module, self._codegen._pass_builder())
+        self._make_names_unique()
         super()._finalize_final_module()
         emitted = self._final_module
         self._bitcode = super()._get_module_for_linking().as_bitcode()
@@ -171,6 +182,7 @@ class InnerLibrary(KernelLibrary):
     def _finalize_final_module(self) -> None:
         self._finalize_dynamic_globals()
         self._verify_declare_only_symbols()
+        self._make_names_unique()
         for function in self._final_module.functions:
             if not function.is_declaration and function.linkage == binding.Linkage.external:
                 function.linkage = "linkonce_odr"  # one of its copies in the callers is used

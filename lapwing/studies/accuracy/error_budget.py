@@ -1,7 +1,9 @@
-"""Error budget of a flight: solver step, ground contact, communication step, coupling.
+"""Error budget of a flight: solver step, ground contact, communication step, coupling, held quantities.
 
-The scene is flown in memory in closed loop, each time with one of the four changed. The autopilot receives the ground
-truth, and winds have their mean values, because noise would hide the errors.
+The scene is flown in memory in closed loop, each time with one of the first four changed. The autopilot receives the
+ground truth, and winds have their mean values, because noise would hide the errors. Quantities that the plant holds
+over a communication step are measured without the control loop: the plant is repeated under the recorded commands, with
+more updates while each command acts as long as before.
 """
 
 import math
@@ -9,19 +11,21 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.scene import Scene
+from lapwing.flights.flight_data import FlightData
 from lapwing.messages.topics import TRUTH
-from lapwing.services.common.communication_schema import Communication, Rates
-from lapwing.services.common.run_schema import Run
-from lapwing.services.scene_resolver import load
+from lapwing.services.common.schemas.communication_schema import Communication, Rates
+from lapwing.services.common.schemas.run_schema import Run
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.accuracy.open_loop import Parts, fly_parts, inputs_of_plant
 from lapwing.studies.accuracy.plant import longest_step
-from lapwing.studies.flight_data import FlightData
-from lapwing.studies.simulate import fly
+from lapwing.studies.simulate import fly, fly_with_ports
 
 MAX_DURATION = 20.0  # [s] of a scene without contact
 MAX_MISSION = 200.0  # [s] of a scene with contact, from take-off to rest
 MAX_TICKS = 5000  # ticks of a scene without contact
-SOURCES = ("plant step", "contact", "communication step", "coupling delay")
+SOURCES = ("plant step", "contact", "communication step", "coupling delay", "held quantities")
 ACCURACIES = (1e-3, 1e-4, 1e-5, 1e-6)  # accuracies of the contact
 REFERENCE_ACCURACY = 1e-9  # of the contact, in all other comparisons
 STEPS = (1, 2, 4, 8)  # steps of the scene's integrator per communication step
@@ -65,6 +69,11 @@ def errors(scene: Scene) -> list[ErrorSource]:
         step = interval / max(REFERENCE_STEPS, factor)
         return ["solver.integrator=rkmk4", f"solver.step={step!r}", f"solver.accuracy={accuracy!r}"]
 
+    def updated(diagram: BlockDiagram, factor: int) -> tuple[Parts, Parts]:
+        settings = [*base, *rate_overrides(scene, rate * factor), *fine_solver(factor)]
+        config = resolve(load(scene.path, settings))
+        return fly_parts(diagram, config._replace(last_tick=factor * diagram.tick - 1), (TRUTH,), lambda _: None)
+
     coupling = scene[Communication].coupling
     parts = []
     exact = flight_with(1, coupling, fine_solver(1))
@@ -86,6 +95,13 @@ def errors(scene: Scene) -> list[ErrorSource]:
         label = f"Jacobi at {rate * factor} Hz"
         parallel = flight_with(factor, "jacobi", fine_solver(factor))
         parts.append(_error_source(SOURCES[3], interval / factor, label, parallel, sequential[factor]))
+    _, diagram = fly_with_ports(resolve(load(scene.path, [*base, *fine_solver(1)])), (TRUTH,))
+    if inputs_of_plant(diagram):
+        reference, _ = updated(diagram, REFERENCE_RATE)
+        for factor in RATE_FACTORS:
+            one, _ = updated(diagram, factor)
+            label = f"updates at {rate * factor} Hz"
+            parts.append(_error_source(SOURCES[4], interval / factor, label, one.flights[0], reference.flights[0]))
     return parts
 
 
@@ -124,8 +140,8 @@ def difference(one: FlightData, other: FlightData) -> tuple[float, float, float]
 
     They are compared at the ticks of the flight with fewer ticks.
     """
-    coarse, fine = (one, other) if one.setup.interval >= other.setup.interval else (other, one)
-    stride = round(coarse.setup.interval / fine.setup.interval)
+    coarse, fine = (one, other) if one.config.interval >= other.config.interval else (other, one)
+    stride = round(coarse.config.interval / fine.config.interval)
     n = min(len(coarse.truth), -(-len(fine.truth) // stride))
     p, q = coarse.truth.position[:n], coarse.truth.orientation[:n]
     r, s = fine.truth.position[::stride][:n], fine.truth.orientation[::stride][:n]

@@ -52,6 +52,7 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "atan": CONTEXT.atan,
     "atan2": CONTEXT.atan2,
     "cbrt": lambda x: CONTEXT.sign(x) * CONTEXT.cbrt(abs(x)),
+    "ceil": CONTEXT.ceil,
     "copysign": lambda x, y: abs(x) * _sign(y),
     "cos": CONTEXT.cos,
     "exp": CONTEXT.exp,

@@ -1,9 +1,10 @@
-"""Error of the solver alone: a flight is repeated in parts with finer steps, under its recorded commands.
+"""Errors of the plant alone: a flight is repeated in parts with finer steps or updates, under its recorded commands.
 
 A multirotor is unstable without an autopilot, so the error of an entire flight under recorded commands grows with a
 high power of time, while a closed loop damps it within seconds. Therefore a part lasts `PART_LENGTH` seconds, begins at
 a recorded state, and overlaps half of the next one. Errors are measured in the second half of each part. The commands
-are data, so neither decisions of an autopilot nor the resolution of sensors have an influence.
+are data, so neither decisions of an autopilot nor the resolution of sensors have an influence. Communication steps may
+be shorter than the recorded ones; each recorded command then acts as long as before.
 """
 
 from collections.abc import Callable
@@ -15,10 +16,10 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram, Service
 from lapwing.cosim.diagram.compiled_block import Block
 from lapwing.cosim.diagram.tick_schedule import LATCHED
+from lapwing.flights.flight_data import FlightData
 from lapwing.kernels.cell import read, write
 from lapwing.messages.topics import Topic
 from lapwing.services.process_table import CLOCK_OWNER, create
-from lapwing.studies.flight_data import FlightData
 
 PART_LENGTH = 2.0  # [s] as in the selection of a solver (`solver_selection`)
 
@@ -33,7 +34,7 @@ class Parts(NamedTuple):
 class _Plant(NamedTuple):
     """Plant of a run, with recorded inputs."""
 
-    graph: BlockDiagram
+    diagram: BlockDiagram
     service: Service
 
 
@@ -52,51 +53,69 @@ def fly_parts(
 
     Args:
         flight: block diagram at the end of the run, with the full history of all ports.
-        finer: its configuration with another solver.
+        finer: its configuration with another solver, and communication steps of the same length or whole fractions.
         topics: topics of the plant to return for each vehicle.
-        observe: called with each tick at which a part begins.
+        observe: called with each recorded tick at which a part begins.
 
     Returns:
         Two series of parts, whose spans together cover the run.
     """
-    recorded, *replicas = (_plant(flight, setup) for setup in (flight.setup, finer, finer))
-    interval = flight.setup.interval
+    recorded, *replicas = (_plant(flight, config) for config in (flight.config, finer, finer))
+    interval = flight.config.interval
+    updates = round(interval / finer.interval)
     half = max(1, round(0.5 * PART_LENGTH / interval))
     spans: tuple[list[tuple[float, float]], ...] = ([], [])
     for number, start in enumerate(range(0, flight.tick, half)):
         stop = min(start + half, flight.tick)
         observe(start)
-        _restart(replicas[number % 2], recorded, start)
-        for plant in (recorded, *replicas):
-            plant.graph.advance(stop)
+        _restart(replicas[number % 2], recorded, start, updates)
+        recorded.diagram.advance(stop)
+        for plant in replicas:
+            plant.diagram.advance((stop - 1) * updates + 1)
         spans[1 - number % 2].append(((start - 0.5) * interval, (stop - 0.5) * interval))
     one, other = (
-        Parts(FlightData.of_each(plant.graph, topics), list(span)) for plant, span in zip(replicas, spans, strict=True)
+        Parts(FlightData.of_each(plant.diagram, topics), list(span))
+        for plant, span in zip(replicas, spans, strict=True)
     )
     return one, other
 
 
-def _plant(flight: BlockDiagram, setup: RunConfig) -> _Plant:
-    """Return the plant of `setup` at tick 0, with its inputs of a finished run."""
-    service = create(setup, CLOCK_OWNER)
+def _plant(flight: BlockDiagram, config: RunConfig) -> _Plant:
+    """Return the plant of `config` at tick 0, with its inputs of a finished run."""
+    service = create(config, CLOCK_OWNER)
+    delays = {i.port: i.delay for part in service.parts for i in getattr(part, "inputs", ())}
     inputs = inputs_of_plant(flight)
     recorded_ports = {port.name for part in service.parts for port in part.outputs} | set(inputs)
-    graph = BlockDiagram(setup, [service], 1, recorded_ports)
+    diagram = BlockDiagram(config, [service], 1, recorded_ports)
+    updates = round(flight.config.interval / config.interval)
     for name in inputs:
-        history = flight.history(name, flight.ports[name].period)
-        graph.put_rows(name, np.arange(len(history)) * flight.ports[name].period, history)
-    return _Plant(graph, service)
+        period, recorded_period, delay = diagram.ports[name].period, flight.ports[name].period, delays[name]
+        history = flight.history(name, recorded_period)
+        ticks = np.arange(0, len(history) * recorded_period * updates, period)
+        if period == 1:  # read `delay` ticks later, in a recorded step that read the row of `delay` of its ticks before
+            numbers = (-(-(ticks + delay) // updates) - delay) // recorded_period
+        else:
+            numbers = ticks // (recorded_period * updates)
+        rows = history[np.clip(numbers, 0, len(history) - 1)]
+        rows[numbers < 0] = 0.0  # as before the first tick of a run
+        diagram.put_rows(name, ticks, rows)
+    return _Plant(diagram, service)
 
 
-def _restart(plant: _Plant, recorded: _Plant, tick: int) -> None:
-    """Set the state of a plant before `tick` to that of another one with the same blocks.
+def _restart(plant: _Plant, recorded: _Plant, tick: int, updates: int) -> None:
+    """Set the state of a plant before a recorded `tick` to that of another one with the same blocks.
 
-    It includes outputs of previous ticks, through which vehicles of a fleet act on each other.
+    The plant has `updates` communication steps in one of the recorded ones. The state includes outputs of previous
+    ticks, through which vehicles of a fleet act on each other.
     """
     for own, other in zip(plant.service.parts, recorded.service.parts, strict=True):
         if isinstance(own, Block):
-            write(own.state, read(other.state))
+            state = read(other.state)
+            if hasattr(state, "last"):  # last tick of the run
+                state = state._replace(last=(state.last + 1) * updates - 1)
+            write(own.state, state)
     outputs = {port.name for part in plant.service.parts for port in part.outputs}
+    first = (tick - 1) * updates + 1  # a step of the flight ends at its tick, which is that of its last update
     for delayed in {i for part in plant.service.parts for i in getattr(part, "inputs", ()) if i.port in outputs}:
-        for stamp in range(max(0, tick - delayed.delay), tick):
-            plant.graph.put_row(delayed.port, stamp, recorded.graph.row(delayed.port, stamp))
+        for back in range(1, min(tick, delayed.delay) + 1):
+            plant.diagram.put_row(delayed.port, first - back, recorded.diagram.row(delayed.port, tick - back))

@@ -22,9 +22,9 @@ from lapwing.dynamics.vehicles.multirotor_equations import (
 from lapwing.kernels import always_inline, kernel, math
 from lapwing.kernels.codegen import map_index
 from lapwing.kernels.state_tree import flatten
-from lapwing.services.common.communication_schema import Communication
-from lapwing.services.common.run_schema import Run
-from lapwing.services.common.vehicle_schema import Vehicle, gravity
+from lapwing.services.common.schemas.communication_schema import Communication
+from lapwing.services.common.schemas.run_schema import Run
+from lapwing.services.common.schemas.vehicle_schema import Vehicle, gravity
 from lapwing.services.plant import models
 from lapwing.studies.accuracy.coordinates import coordinates, defect
 from lapwing.studies.accuracy.extended_numbers import Number

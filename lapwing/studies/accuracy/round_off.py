@@ -91,7 +91,7 @@ def extend(function: Any) -> Callable[..., Any]:
     return _extend(function, {})
 
 
-def _extend(function: Any, known: dict[int, Any]) -> Any:
+def _extend(function: Any, known: dict[FunctionType, Any]) -> Any:
     if function is math:
         return _MATH
     if isinstance(function, ModuleType) and function.__name__.startswith("lapwing"):
@@ -101,18 +101,18 @@ def _extend(function: Any, known: dict[int, Any]) -> Any:
     is_own = python is not function or (getattr(python, "__module__", None) or "lapwing").startswith("lapwing")
     if not isinstance(python, FunctionType) or not is_own:
         return function
-    if id(python) in known:
-        return known[id(python)]
+    if python in known:
+        return known[python]
     if python.__module__ == noise.__name__:
         return lambda *values: in_extended_precision(function(*_map_leaves(Number, float, values)))
     if generate is not None:
         result: Any = _extend_generator(generate, known)
-        known[id(python)] = result
+        known[python] = result
         return result
     names = dict(python.__globals__)
     cells = tuple(CellType() for _ in python.__closure__ or ()) or None
     result = FunctionType(python.__code__, names, python.__name__, python.__defaults__, cells)
-    known[id(python)] = result
+    known[python] = result
     for cell, original in zip(cells or (), python.__closure__ or (), strict=True):
         cell.cell_contents = _extend(original.cell_contents, known)
     names |= {name: _extend(names[name], known) for name in python.__code__.co_names if name in names}
@@ -122,7 +122,7 @@ def _extend(function: Any, known: dict[int, Any]) -> Any:
 class _Module:
     """A module whose functions compute with extended numbers."""
 
-    def __init__(self, module: ModuleType, known: dict[int, Any]):
+    def __init__(self, module: ModuleType, known: dict[FunctionType, Any]):
         self._module, self._known = module, known
 
     def __getattr__(self, name: str) -> Any:
@@ -138,7 +138,7 @@ def _generator(function: Any) -> Callable[..., Any] | None:
     return GENERATORS.get(function) if is_generated else None
 
 
-def _extend_generator(generate: Callable[..., Any], known: dict[int, Any]) -> Callable[..., Any]:
+def _extend_generator(generate: Callable[..., Any], known: dict[FunctionType, Any]) -> Callable[..., Any]:
     variants: dict[Any, Any] = {}
 
     def call(*values: Any) -> Any:

@@ -6,11 +6,11 @@ import numpy as np
 
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.integrators import get
-from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters, LiftCommand
 from lapwing.kernels.state_tree import flatten
-from lapwing.services.common.communication_schema import Communication
-from lapwing.services.common.run_schema import Run
-from lapwing.services.common.vehicle_schema import Vehicle
+from lapwing.papers.cooperative_load.cooperative_load import CooperativeLoadParameters, LiftCommand
+from lapwing.services.common.schemas.communication_schema import Communication
+from lapwing.services.common.schemas.run_schema import Run
+from lapwing.services.common.schemas.vehicle_schema import Vehicle
 from lapwing.studies.accuracy import plant
 from lapwing.studies.accuracy.coordinates import coordinates
 from lapwing.studies.accuracy.integrate import SAMPLES, fixed_step_methods, sample_states

@@ -33,9 +33,9 @@ def start_difference(accuracy: float) -> float:
     return max(SHARE * accuracy, MIN_DIFFERENCE)
 
 
-def with_start_shifted(setup: RunConfig, difference: float) -> RunConfig:
+def with_start_shifted(config: RunConfig, difference: float) -> RunConfig:
     """Return a run configuration with each number x of the initial motions increased by difference (1 + |x|)."""
-    plant = setup.services[CLOCK_OWNER]
+    plant = config.services[CLOCK_OWNER]
     if isinstance(plant.parameters, PerVehicle):
         vehicles, configs = plant.parameters
         plant = plant._replace(
@@ -43,7 +43,7 @@ def with_start_shifted(setup: RunConfig, difference: float) -> RunConfig:
         )
     else:
         plant = _shift_start(plant, difference)
-    return setup._replace(services={**setup.services, CLOCK_OWNER: plant})
+    return config._replace(services={**config.services, CLOCK_OWNER: plant})
 
 
 def _shift_start(service: ServiceConfig, difference: float) -> ServiceConfig:
@@ -75,9 +75,9 @@ def first_signal(a: BlockDiagram, b: BlockDiagram, limit: float) -> Signal | Non
         for port in (port for part in service.parts for port in part.outputs):
             if service.name == CLOCK_OWNER or port.period == LATCHED:
                 continue
-            pair = [columns(port.like, graph.history(port.name, port.period)) for graph in (a, b)]
+            pair = [columns(port.example, diagram.history(port.name, port.period)) for diagram in (a, b)]
             for name, one, other in _pair_columns(port.name, *pair):
-                signal = _first_difference(name, one, other, limit, port.period * a.setup.interval)
+                signal = _first_difference(name, one, other, limit, port.period * a.config.interval)
                 if signal and (first is None or signal.time < first.time):
                     first = signal
     return first

@@ -1,8 +1,12 @@
-"""`[solver] accuracy`: cheapest integrator and step for a scene, from cached measurements."""
+"""`[solver] accuracy`: cheapest integrator and step for a scene, from cached measurements.
+
+The choice counts evaluations of the right-hand side, so it is a function of the scene and the version alone.
+"""
 
 import hashlib
 import json
 import math
+import sys
 from collections.abc import Callable
 from contextlib import suppress
 from pathlib import Path
@@ -12,16 +16,18 @@ from lapwing.cosim.scene import KeyOrigin, Scene, SceneError
 from lapwing.dynamics import integrators
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.kernels import cache_folder, source_digest
-from lapwing.services.common.communication_schema import Communication
-from lapwing.services.common.run_schema import Run
-from lapwing.services.common.vehicle_schema import Effects, Vehicle
+from lapwing.services.common.schemas.communication_schema import Communication
+from lapwing.services.common.schemas.run_schema import Run
+from lapwing.services.common.schemas.vehicle_schema import Effects, Vehicle
 from lapwing.services.plant.schema import Solver, accuracy_to_select_for
 from lapwing.studies.accuracy import plant, scenes
+from lapwing.studies.accuracy.problem import SolverMethod
 from lapwing.studies.accuracy.work_precision import FINE_ENOUGH, Point, cheapest, measure
 
 CANDIDATES = ("rkmk2", "rk4_renormalised", "rkmk54", "rk8_renormalised")  # each the cheapest for some system and error
 IMPACT_SHARE = 3e-3  # of the accuracy, because an impact amplifies position errors to 300 times larger velocity errors
 JUMP_SHARE = 0.125  # of the accuracy while voltages jump, because the largest error of such flights is 7 times larger
+MOST_STEPS = 32  # per communication step, half of those of the reference: the finest step that is tried
 HIDDEN = 2.0  # factor by which a finer step errs more if the longer one is under error control
 
 
@@ -53,10 +59,10 @@ def overrides(scene: Scene, notify: Callable[[str], None]) -> list[str]:
 
 
 def _combine_vehicles(vehicles: list[list[Point]]) -> list[Point]:
-    """Return the points common to all vehicles, with the largest error and the total time."""
+    """Return the points common to all vehicles, with the largest error."""
     by_key = [{(p.method, p.setting): p for p in points} for points in vehicles]
     common = [[points[key] for points in by_key] for key in by_key[0] if all(key in points for points in by_key)]
-    return [same[0]._replace(error=max(p.error for p in same), time=sum(p.time for p in same)) for same in common]
+    return [same[0]._replace(error=max(p.error for p in same)) for same in common]
 
 
 def _expected_points(scene: Scene, accuracy: float, notify: Callable[[str], None]) -> list[Point]:
@@ -70,7 +76,7 @@ def _expected_points(scene: Scene, accuracy: float, notify: Callable[[str], None
 
 
 def _expected_errors(gentle: list[Point], share: float, others: list[list[Point]]) -> list[Point]:
-    """Return the points of all flights with the largest errors expected in flight; times are those of gentle flight."""
+    """Return the points of all flights with the largest errors expected in flight."""
     flights = [(gentle, share), *((points, JUMP_SHARE) for points in others)]
     by_key = {(p.method, p.setting): p for points, _ in reversed(flights) for p in points}
     return [
@@ -110,19 +116,23 @@ def _points(scene: Scene, names: tuple[str, ...], notify: Callable[[str], None])
     path = _cache_file(scene, names)
     if path and (cached := _read(path)):
         return cached
-    problems = []
+    problems, finest = [], (1.0 - 1e-9) * scene[Communication].interval / MOST_STEPS
     for problem in scenes.manoeuvres(scene):
         methods = [method for method in problem.methods if method.name in names] or problem.methods
-        problems.append(problem._replace(methods=methods))
+        problems.append(problem._replace(methods=[_down_to(finest, method) for method in methods]))
     measured = ", ".join(method.name for method in problems[0].methods)
     notify(f"measuring {measured} on this plant for solver.accuracy (first time only)")
-    points = [measure(problem) for problem in problems]
+    points = [measure(problem, sys.maxsize, timed=False) for problem in problems]
     if path is not None:
         with suppress(OSError):  # without a cache they are measured again
             path.parent.mkdir(parents=True, exist_ok=True)
             with complete_file(path) as file:
                 file.write_text(json.dumps([[p._asdict() for p in each] for each in points]), encoding="utf-8")
     return points
+
+
+def _down_to(finest: float, method: SolverMethod) -> SolverMethod:
+    return method._replace(settings=[h for h in method.settings if h >= finest])
 
 
 def _read(path: Path) -> list[list[Point]]:
@@ -139,6 +149,7 @@ def _cache_file(scene: Scene, names: tuple[str, ...]) -> Path | None:
     if folder is None:
         return None
     modules = [
+        __name__,
         f"lapwing.services.plant.models.{scene[Vehicle].model}",
         *(f"lapwing.dynamics.integrators.{name}" for name in integrators.names()),
         *(f"lapwing.dynamics.effects.{name}" for name in scene[Effects].tables),

@@ -5,9 +5,9 @@ from typing import NamedTuple
 
 import numpy as np
 
+from lapwing.flights.flight_data import FlightData
 from lapwing.messages.topics import BATTERY, TRUTH
 from lapwing.studies.accuracy.coordinates import matrices
-from lapwing.studies.flight_data import FlightData
 
 TOPICS = (TRUTH, BATTERY)
 BATTERY_FIELDS = ("voltage", "charge")  # of BatteryState, without the current, which jumps if a motor is switched off
@@ -45,11 +45,11 @@ def differences_of_all(
 def differences(
     flight: FlightData, exact: FlightData, spans: list[tuple[float, float]] | None = None
 ) -> list[Quantity]:
-    """Return the largest error of each quantity of the state, at the ticks common to both flights.
+    """Return the largest error of each quantity of the state, at the ticks of the first flight.
 
     Args:
         flight: any flight.
-        exact: the flight to compare with.
+        exact: the flight to compare with, with the same samples or a whole multiple of them.
         spans: intervals [s] to compare, in order, end exclusive; None: all.
     """
     result = []
@@ -68,15 +68,17 @@ def _errors(flight: FlightData, exact: FlightData) -> Iterator[Errors]:
         a, b = (np.asarray(getattr(each.truth, field)) for each in (flight, exact))
         if field == "orientation":
             a, b = matrices(a), matrices(b)
-        yield from _error(name, flight.truth.times, a, b)
+        yield from _error(name, flight.truth.times, exact.truth.times, a, b)
     if flight.has("battery"):
         for field in BATTERY_FIELDS:
             a, b = (np.asarray(getattr(each.topic("battery"), field)) for each in (flight, exact))
-            yield from _error(f"battery {field}", flight.times("battery"), a, b)
+            yield from _error(f"battery {field}", flight.times("battery"), exact.times("battery"), a, b)
 
 
-def _error(name: str, times: np.ndarray, a: np.ndarray, b: np.ndarray) -> Iterator[Errors]:
+def _error(name: str, times: np.ndarray, exact_times: np.ndarray, a: np.ndarray, b: np.ndarray) -> Iterator[Errors]:
     """Yield the errors of one quantity of the state; nothing if the vehicle does not have it."""
+    if min(len(times), len(exact_times)) > 1:
+        b = b[:: round((times[1] - times[0]) / (exact_times[1] - exact_times[0]))]
     n = min(len(a), len(b))
     a, b = a[:n].reshape(n, -1), b[:n].reshape(n, -1)
     if a.size and np.isfinite(b).all():

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics import discovery
-from lapwing.services.common.run_schema import SHIPPED
+from lapwing.services.common.schemas.run_schema import SHIPPED
 from lapwing.services.scene_resolver import load
 from lapwing.studies.accuracy.problem import Problem
 from lapwing.studies.accuracy.systems import problems

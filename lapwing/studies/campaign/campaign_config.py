@@ -4,15 +4,15 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.scene import Scene
 from lapwing.messages.topics import ACTUATORS, ESTIMATE, ESTIMATE_COVARIANCE, SETPOINT, STATUS, TRUTH
 from lapwing.services.autopilot.schema import Autopilot
-from lapwing.services.common.communication_schema import Communication, Rates
 from lapwing.services.common.firmware.schema import TABLE, firmware_of, flown_by_firmware
-from lapwing.services.common.run_schema import follows_trajectory
+from lapwing.services.common.schemas.communication_schema import Communication, Rates
+from lapwing.services.common.schemas.run_schema import follows_trajectory
 from lapwing.services.scene_resolver import resolve
 
 TOPICS = (TRUTH, SETPOINT, ACTUATORS, ESTIMATE, ESTIMATE_COVARIANCE, STATUS)
 
 
-def campaign_setup(scene: Scene) -> RunConfig:
+def campaign_config(scene: Scene) -> RunConfig:
     """Return the run configuration of a flight, with an estimate at every tick.
 
     Raises:

@@ -1,16 +1,21 @@
-"""Distributions of varied scene keys, defined by their quantile functions."""
+"""Distributions of varied scene keys, defined by their quantile functions.
 
+Correlated keys share normal numbers: the quantile of one key follows from a weighted sum of those of several.
+"""
+
+import math
 import re
 import sys
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from inspect import signature
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.special import ndtri
+from scipy.special import ndtr, ndtri
 
 from lapwing.cosim.scene.overrides import value_of
+from lapwing.cosim.scene.toml_text import toml
 
 
 class Distribution(NamedTuple):
@@ -18,14 +23,22 @@ class Distribution(NamedTuple):
 
     name: str
     arguments: tuple[Any, ...]
+    weights: tuple[tuple[str, float], ...] = ()  # of the normal numbers of correlated keys, with a sum of squares of 1
 
     def __str__(self) -> str:
-        return f"{self.name}({', '.join(map(_text, self.arguments))})"
+        arguments = [*self.arguments, *([dict(self.weights)] if self.weights else [])]
+        return f"{self.name}({', '.join(map(toml, arguments))})"
 
     @property
     def values(self) -> tuple[Any, ...]:
         """Values of a discrete distribution, equally likely; () for a continuous one."""
         return _VALUES[self.name](*self.arguments) if self.name in _VALUES else ()
+
+    def quantile(self, u: Mapping[str, float], key: str) -> float:
+        """Return the number in (0, 1) for the value of this key, given independent ones of all keys."""
+        if not self.weights:
+            return u[key]
+        return float(ndtr(sum(weight * ndtri(u[other]) for other, weight in self.weights)))
 
     def at(self, u: float) -> Any:
         """Return the quantile of u, 0 < u < 1."""
@@ -34,13 +47,29 @@ class Distribution(NamedTuple):
         return float(_QUANTILES[self.name](u, *self.arguments))
 
 
-def normal(mean: float, deviation: float) -> Distribution:
+def normal(mean: float, deviation: float, weights: Mapping[str, float] | None = None) -> Distribution:
     """Return a normal distribution with this mean and standard deviation, in the unit of the key.
 
+    Args:
+        mean: mean.
+        deviation: standard deviation.
+        weights: weights of the normal numbers of correlated keys; see `lapwing.posterior`.
+
     Raises:
-        ValueError: the deviation is below 0.
+        ValueError: the deviation is below 0, or the weights are invalid.
     """
-    return _validate("normal", mean, deviation, valid=deviation >= 0.0, expected="a deviation of at least 0")
+    result = _validate("normal", mean, deviation, valid=deviation >= 0.0, expected="a deviation of at least 0")
+    return _weighted(result, weights)
+
+
+def lognormal(mean: float, deviation: float, weights: Mapping[str, float] | None = None) -> Distribution:
+    """Return a log-normal distribution with this mean and standard deviation; its values are positive. See `normal`.
+
+    Raises:
+        ValueError: the mean is not above 0, the deviation is below 0, or the weights are invalid.
+    """
+    valid, expected = mean > 0.0 and deviation >= 0.0, "a mean above 0 and a deviation of at least 0"
+    return _weighted(_validate("lognormal", mean, deviation, valid=valid, expected=expected), weights)
 
 
 def uniform(low: float, high: float) -> Distribution:
@@ -83,9 +112,14 @@ def choice(*values: Any) -> Distribution:
     return Distribution("choice", values)
 
 
-KINDS: dict[str, Callable[..., Distribution]] = {f.__name__: f for f in (normal, uniform, loguniform, linspace, choice)}
+KINDS: dict[str, Callable[..., Distribution]] = {
+    f.__name__: f for f in (normal, lognormal, uniform, loguniform, linspace, choice)
+}
 _QUANTILES: dict[str, Callable[..., float]] = {
     "normal": lambda u, mean, deviation: mean + deviation * ndtri(u),
+    "lognormal": lambda u, mean, deviation: math.exp(
+        _log_mean(mean, deviation) + log_deviation(mean, deviation) * ndtri(u)
+    ),
     "uniform": lambda u, low, high: low + u * (high - low),
     "loguniform": lambda u, low, high: low * (high / low) ** u,
 }
@@ -111,7 +145,7 @@ def parse(text: str) -> Distribution:
     try:
         return KINDS[match[1]](*arguments)
     except TypeError:
-        names = ", ".join(signature(KINDS[match[1]]).parameters)
+        names = ", ".join(name for name in signature(KINDS[match[1]]).parameters if name != "weights")
         raise ValueError(f"{match[1]}: got {match[2]!r}, expected {match[1]}({names}) with numbers") from None
 
 
@@ -123,11 +157,24 @@ def _arguments(text: str) -> list[Any]:
         return [value_of(part.strip()) for part in _SPLIT.findall(text)]
 
 
+def log_deviation(mean: float, deviation: float) -> float:
+    """Return the standard deviation of the logarithm of a log-normal number with this mean and standard deviation."""
+    return math.sqrt(math.log1p((deviation / mean) ** 2))
+
+
+def _log_mean(mean: float, deviation: float) -> float:
+    return math.log(mean) - 0.5 * log_deviation(mean, deviation) ** 2
+
+
+def _weighted(distribution: Distribution, weights: Mapping[str, float] | None) -> Distribution:
+    if not weights:
+        return distribution
+    if not abs(math.fsum(weight * weight for weight in weights.values()) - 1.0) < 1e-6:
+        raise ValueError(f"{distribution.name}: expected weights whose squares have the sum 1")
+    return distribution._replace(weights=tuple(weights.items()))
+
+
 def _validate(name: str, *numbers: float, valid: bool, expected: str) -> Distribution:
     if not valid or not all(abs(number) <= sys.float_info.max for number in numbers):
         raise ValueError(f"{name}: expected {expected}, got {', '.join(map(str, numbers))}")
     return Distribution(name, numbers)
-
-
-def _text(value: Any) -> str:
-    return f'"{value}"' if isinstance(value, str) else str(value).lower() if isinstance(value, bool) else repr(value)

@@ -4,11 +4,11 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-from lapwing.services.common.success_criteria import Success
-from lapwing.studies.flight_data import FlightData
-from lapwing.studies.metrics import METRICS
-from lapwing.studies.outcome import KINDS
-from lapwing.studies.separation import nearest
+from lapwing.flights.flight_data import FlightData
+from lapwing.flights.metrics import METRICS
+from lapwing.flights.outcome import KINDS
+from lapwing.flights.separation import nearest
+from lapwing.services.common.schemas.success_criteria import Success
 
 NEAREST = "nearest"  # [m] least distance between two vehicles
 POSITIONS = ("touchdown.x", "touchdown.y")  # undefined for several vehicles

@@ -21,8 +21,8 @@ import numpy as np
 from lapwing.cosim.complete_file import complete_file
 from lapwing.cosim.output_lock import write_errors
 from lapwing.cosim.run_errors import RunFailed
-from lapwing.services.common.run_schema import Published
-from lapwing.services.common.success_criteria import Success
+from lapwing.services.common.schemas.run_schema import Published
+from lapwing.services.common.schemas.success_criteria import Success
 from lapwing.studies.campaign import run_table
 from lapwing.studies.campaign.distributions import parse
 from lapwing.studies.campaign.plan import Plan

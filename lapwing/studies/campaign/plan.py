@@ -58,8 +58,8 @@ class Plan(NamedTuple):
 
     def values(self, run: int) -> dict[str, Any]:
         """Return the drawn values of a run by key."""
-        quantiles = _DESIGNS[self.design](self, run)
-        drawn = {key: distribution.at(u) for (key, distribution), u in zip(self.vary, quantiles, strict=True)}
+        independent = dict(zip((key for key, _ in self.vary), _DESIGNS[self.design](self, run), strict=True))
+        drawn = {key: distribution.at(distribution.quantile(independent, key)) for key, distribution in self.vary}
         return drawn | (self.sweep[run % len(self.sweep)] if self.sweep else {})
 
     def overrides_of(self, run: int) -> dict[str, Any]:
@@ -94,6 +94,9 @@ def plan(
     distributions, sweep_rows = tuple(sorted((vary or {}).items())), _read_sweep(sweep) if sweep else ()
     if duplicates := sorted(set(vary or {}) & set(sweep_rows[0] if sweep_rows else ())):
         raise ValueError(f"--vary {duplicates[0]}: also varied by the sweep {sweep}; use one of both")
+    for key, distribution in distributions:
+        if missing := [other for other, _ in distribution.weights if other not in (vary or {})]:
+            raise ValueError(f"--vary {key}: is correlated with {missing[0]}, which does not vary; vary both")
     overrides = tuple(overrides)
     fixed = "override" if any(text.partition("=")[0].strip() == SEED for text in overrides) else ""
     if option := Plan(path, (), seed, 1, distributions, sweep_rows).option(SEED) or fixed:

@@ -6,13 +6,13 @@ from typing import Any
 
 import numpy as np
 
+from lapwing.flights.metrics import METRICS
+from lapwing.flights.outcome import FAILED, KINDS
+from lapwing.flights.tracking import AXES
 from lapwing.studies.campaign.fleet_columns import NEAREST
 from lapwing.studies.campaign.folder import Folder
 from lapwing.studies.campaign.runs import REJECTED
 from lapwing.studies.campaign.statistics import Interval, Spread, interval, spread
-from lapwing.studies.metrics import METRICS
-from lapwing.studies.outcome import KINDS
-from lapwing.studies.tracking import AXES
 
 # The worst value of all other metrics is the largest.
 MIN_IS_WORST = (NEAREST, *(f"within_3sigma.{axis}" for axis in "xyz"), "within_95.nees")
@@ -66,6 +66,11 @@ class Results:
     def failure(self) -> Interval:
         """Probability of a failure."""
         return interval(int((~self["success"].astype(bool)).sum()), len(self))
+
+    @property
+    def lost(self) -> bool:
+        """True if a vehicle crashed or diverged, whatever the criteria of success."""
+        return bool(np.isin(self["outcome"].astype(str), FAILED).any())
 
     @cached_property
     def outcome_text(self) -> str:

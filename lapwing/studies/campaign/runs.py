@@ -5,7 +5,7 @@ import hashlib
 import math
 import platform
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from functools import cache
 from importlib.metadata import version
 from pathlib import Path
@@ -17,14 +17,14 @@ import lapwing.services
 from lapwing.cosim.config.provenance import package_version
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.scene import Scene, SceneError
-from lapwing.services.common.success_criteria import Success
-from lapwing.services.common.vehicle_schema import Vehicle
+from lapwing.flights.metrics import METRICS, check_success, joint_end_state, metrics
+from lapwing.services.common.schemas.success_criteria import Success
+from lapwing.services.common.schemas.vehicle_schema import Vehicle
 from lapwing.services.process_table import foreign_firmware
 from lapwing.services.scene_resolver import load, reseed
 from lapwing.studies.campaign import fleet_columns
-from lapwing.studies.campaign.campaign_config import TOPICS, campaign_setup
-from lapwing.studies.campaign.plan import Plan
-from lapwing.studies.metrics import METRICS, check_success, joint_end_state, metrics
+from lapwing.studies.campaign.campaign_config import TOPICS, campaign_config
+from lapwing.studies.campaign.plan import SEED, Plan
 from lapwing.studies.simulate import fly_each
 
 REJECTED = "rejected"  # outcome of a run with values that the scene rejects
@@ -70,7 +70,7 @@ def columns(plan: Plan, vehicles: Sequence[str]) -> dict[str, type]:
     return {**result, **fleet_columns.columns(tuple(vehicles)), "end_state": str}
 
 
-def first_setup(plan: Plan) -> tuple[int, RunConfig]:
+def first_config(plan: Plan) -> tuple[int, RunConfig]:
     """Return the number and run configuration of the first run that the scene accepts.
 
     Raises:
@@ -80,18 +80,18 @@ def first_setup(plan: Plan) -> tuple[int, RunConfig]:
     spread_runs = np.linspace(0, plan.runs - 1, TRIAL_RUNS, dtype=int).tolist()  # the first runs of a grid are similar
     for run in dict.fromkeys([*range(min(plan.runs, TRIAL_RUNS)), *spread_runs]):
         try:
-            return run, setup_of(plan, run)
+            return run, config_of(plan, run)
         except SceneError as error:
             first_error = first_error or error
     assert first_error is not None
     raise first_error
 
 
-def reference(run: int, setup: RunConfig) -> Reference:
+def reference(run: int, config: RunConfig) -> Reference:
     """Fly a run and return the reference; without an end state for a foreign firmware, whose flights differ."""
-    if foreign_firmware(setup):
+    if foreign_firmware(config):
         return Reference(versions(), run, "")
-    return Reference(versions(), run, joint_end_state(fly_each(setup, TOPICS)))
+    return Reference(versions(), run, joint_end_state(fly_each(config, TOPICS)))
 
 
 def fly_runs(plan: Plan, reference: Reference, start: int, stop: int) -> list[Row]:
@@ -105,20 +105,24 @@ def fly_runs(plan: Plan, reference: Reference, start: int, stop: int) -> list[Ro
     return [row_of(plan, run, rows) for run in range(start, stop)]
 
 
-def row_of(plan: Plan, run: int, rows: dict[str, np.ndarray] | None = None) -> Row:
+def row_of(
+    plan: Plan, run: int, rows: dict[str, np.ndarray] | None = None, values: Mapping[str, Any] | None = None
+) -> Row:
     """Fly a run. Return its row; a run that the scene rejects has that as its outcome.
 
     Args:
         plan: plan of the campaign.
         run: number of the run.
         rows: reusable memory for the flights of successive runs.
+        values: values by key instead of the drawn ones.
     """
-    row: Row = {"run": run, "seed": plan.seed_of(run), **plan.values(run), "success": False}
+    drawn = plan.values(run) if values is None else values
+    row: Row = {"run": run, "seed": plan.seed_of(run), **drawn, "success": False}
     try:
-        setup = setup_of(plan, run)
+        config = config_of(plan, run, drawn)
     except SceneError as error:
         return {**row, **_rejected_row(vehicles(plan)), "outcome_text": _rejection_text(error)}
-    flights = fly_each(setup, TOPICS, rows)
+    flights = fly_each(config, TOPICS, rows)
     row["end_state"] = joint_end_state(flights)
     scene = scene_of(plan)
     if scene.vehicles:
@@ -148,16 +152,17 @@ def _rejected_row(names: tuple[str, ...]) -> Row:
     return {**result, "outcome": REJECTED, "end_state": ""}
 
 
-def setup_of(plan: Plan, run: int) -> RunConfig:
-    """Return the run configuration of a run.
+def config_of(plan: Plan, run: int, values: Mapping[str, Any] | None = None) -> RunConfig:
+    """Return the run configuration of a run, with the drawn values or those of `values`.
 
     Raises:
-        SceneError: the drawn values do not fit the scene.
+        SceneError: the values do not fit the scene.
     """
-    if not plan.keys:
+    drawn = plan.values(run) if values is None else values
+    if not drawn:
         return reseed(_resolve(plan.path, plan.overrides), plan.seed_of(run))
     with name_option_in_errors(plan):
-        return campaign_setup(load(scene_of(plan), plan.overrides_of(run)))
+        return campaign_config(load(scene_of(plan), {**drawn, SEED: plan.seed_of(run)}))
 
 
 @contextlib.contextmanager
@@ -204,7 +209,7 @@ def _scene(scene: str, overrides: tuple[str, ...]) -> Scene:
 
 @cache
 def _resolve(scene: str, overrides: tuple[str, ...]) -> RunConfig:
-    return campaign_setup(_scene(scene, overrides))
+    return campaign_config(_scene(scene, overrides))
 
 
 _verified_end_states: set[str] = set()  # end states that this process has reproduced
@@ -220,10 +225,10 @@ def _check(plan: Plan, reference: Reference) -> None:
     for name, expected in reference.versions.items():
         if (result := versions().get(name)) != expected:
             raise ValueError(f"{worker}: has {name} {result}; expected {expected} as at the start of the campaign")
-    if foreign_firmware(setup_of(plan, reference.run)):
+    if foreign_firmware(config_of(plan, reference.run)):
         return  # its flights are not repeatable
     if reference.end_state not in _verified_end_states:
-        if (result := joint_end_state(fly_each(setup_of(plan, reference.run), TOPICS))) != reference.end_state:
+        if (result := joint_end_state(fly_each(config_of(plan, reference.run), TOPICS))) != reference.end_state:
             raise ValueError(
                 f"{worker}: the end state of run {reference.run} differs from that at the start of the campaign"
             )

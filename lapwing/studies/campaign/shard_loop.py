@@ -5,10 +5,10 @@ from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
+from lapwing.flights.outcome import KINDS
 from lapwing.studies.campaign.folder import Folder
 from lapwing.studies.campaign.runs import REJECTED, Reference, Row, fly_runs
 from lapwing.studies.campaign.statistics import Interval, interval
-from lapwing.studies.outcome import KINDS
 from lapwing.studies.workers import Workers
 
 

@@ -5,11 +5,12 @@ from pathlib import Path
 from lapwing.cosim.scene import Scene
 from lapwing.services.scene_resolver import load
 from lapwing.studies.campaign.folder import read
+from lapwing.studies.campaign.plan import Plan
 from lapwing.studies.campaign.runs import REJECTED, name_option_in_errors, scene_of, sources
 
 
-def scene_of_run(scene: Path, run: int, folder: Path) -> Scene:
-    """Return the scene of a run with its drawn values.
+def plan_of(scene: Path, run: int, folder: Path) -> Plan:
+    """Return the plan of a campaign for the repetition of a run.
 
     Args:
         scene: scene of the campaign.
@@ -27,6 +28,12 @@ def scene_of_run(scene: Path, run: int, folder: Path) -> Scene:
     for name in sorted({*recorded, *current}):
         if recorded.get(name) != current.get(name):
             raise ValueError(f"{scene}: {name} differs from the campaign {folder}; expected the original scene")
+    return plan
+
+
+def scene_of_run(scene: Path, run: int, folder: Path) -> Scene:
+    """Return the scene of a run with its drawn values. See `plan_of` for arguments and errors."""
+    plan = plan_of(scene, run, folder)
     with name_option_in_errors(plan):
         return load(scene_of(plan), plan.overrides_of(run))
 

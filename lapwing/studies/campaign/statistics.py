@@ -1,12 +1,14 @@
 """Statistics of campaigns: intervals, distributions, sensitivities."""
 
-from importlib.util import find_spec
+import math
 from typing import NamedTuple
 
 import numpy as np
 from scipy import stats
 
 CONFIDENCE = 0.95  # confidence level of every interval
+MANY_VALUES = 10  # values of a parameter above which it is split into intervals
+RESAMPLES = 100  # resamples of a bootstrap
 
 
 class Interval(NamedTuple):
@@ -74,29 +76,58 @@ def rank_correlation(x: np.ndarray, y: np.ndarray) -> Interval:
     return Interval(rho, float(np.tanh(z - half_width)), float(np.tanh(z + half_width)))
 
 
-def has_sobol() -> bool:
-    """Return True if SALib is installed."""
-    return find_spec("SALib") is not None
+def groups(x: np.ndarray, count: int) -> np.ndarray:
+    """Return the number of a group for each value of a parameter, shape (n,), counted from 0.
 
-
-def sobol(x: np.ndarray, y: np.ndarray, names: list[str]) -> list[Interval]:
-    """Return first-order Sobol indices of the columns of x (n, k) for y (n,), from independent columns.
-
-    NaN for a constant column. By SALib's RBD-FAST: Plischke, "An effective algorithm for computing global sensitivity
-    indices (EASI)", 2010.
+    Each of at most `MANY_VALUES` different values is a group; more values are split into `count` groups of equal size.
     """
-    from SALib.analyze import rbd_fast
+    values, index = np.unique(x, return_inverse=True)
+    if len(values) <= MANY_VALUES:
+        return index
+    edges = np.quantile(x, np.linspace(0.0, 1.0, count + 1))
+    return np.unique(np.searchsorted(edges[1:-1], x, side="right"), return_inverse=True)[1]
 
-    low, high = x.min(axis=0), x.max(axis=0)
-    varying = np.flatnonzero(high > low)
-    bounds = np.column_stack([low, high])[varying].tolist()
-    problem = {"num_vars": len(varying), "names": [names[k] for k in varying], "bounds": bounds}
-    with np.errstate(invalid="ignore", divide="ignore"):  # a resample with equal results of all runs
-        result = rbd_fast.analyze(problem, x[:, varying], y, seed=1, conf_level=CONFIDENCE)
-    indices = [Interval(np.nan, np.nan, np.nan)] * len(names)
-    for k, s, c in zip(varying, result["S1"], result["S1_conf"], strict=True):
-        indices[k] = Interval(float(s), float(s - c), float(s + c))
-    return indices
+
+def variance_share(x: np.ndarray, y: np.ndarray) -> Interval:
+    """Return the share of the variance of y (n,) that the parameter x (n,) explains alone: its first-order Sobol index.
+
+    Means of y in groups of x, without what chance contributes: epsilon squared of Kelley, "An unbiased correlation
+    ratio measure", 1935. The interval is that of a bootstrap. NaN for a constant column.
+    """
+    n, index = len(x), groups(x, max(2, int(0.5 * np.sqrt(len(x))))) if len(x) else np.empty(0, int)
+    count = int(index.max()) + 1 if n else 0
+    if not 1 < count < n or np.ptp(y) == 0.0:
+        return Interval(np.nan, np.nan, np.nan)
+    centred = y - y.mean()
+
+    def share(rows: np.ndarray) -> float:
+        group, values = index[rows], centred[rows]
+        size, total = np.bincount(group, minlength=count), np.bincount(group, values, count)
+        between = float((total[size > 0] ** 2 / size[size > 0]).sum()) - values.sum() ** 2 / n
+        whole = float((values - values.mean()) @ (values - values.mean()))
+        if whole == 0.0:
+            return np.nan
+        return 1.0 - (whole - between) / (n - (size > 0).sum()) * (n - 1) / whole
+
+    random = np.random.default_rng(1)
+    value, deviation = share(np.arange(n)), np.nanstd([share(random.integers(0, n, n)) for _ in range(RESAMPLES)])
+    half_width = float(stats.norm.ppf(0.5 + 0.5 * CONFIDENCE) * deviation)
+    return Interval(value, value - half_width, value + half_width)
+
+
+def ratio_change(a: np.ndarray, b: np.ndarray) -> Interval:
+    """Return the relative change from a to b over pairs of positive values, by Student's interval of logarithms."""
+    is_valid = (a > 0.0) & (b > 0.0)  # False for NaN
+    log = paired_difference(np.log(a[is_valid]), np.log(b[is_valid]))
+    return Interval(*(float(np.expm1(value)) for value in log))
+
+
+def percent(p: Interval, signed: bool = False) -> str:
+    """Return a share with its interval and the digits that the interval allows: "75 % (95 %: 68 to 81)"."""
+    width = 100.0 * (p.high - p.low) / 2.0
+    digits = min(max(0, math.ceil(-math.log10(width))), 9) if 0.0 < width < math.inf else 0
+    value, low, high = (f"{100.0 * number:{'+' if signed else ''}.{digits}f}" for number in p)
+    return f"{value} % (95 %: {low} to {high})"
 
 
 def ellipse(points: np.ndarray, share: float) -> np.ndarray:

@@ -28,7 +28,7 @@ from lapwing.dynamics.vehicles.multirotor_equations import (
 from lapwing.kernels import kernel
 from lapwing.kernels.cell import Cell
 from lapwing.kernels.codegen import compile_source, generic
-from lapwing.services.common.vehicle_schema import active, airframe, rotor_constants, start_height
+from lapwing.services.common.schemas.vehicle_schema import active, airframe, rotor_constants, start_height
 from lapwing.services.plant.schema import Solver, method
 from lapwing.studies.effects.variants import Tables, variant
 
@@ -58,8 +58,8 @@ class _Plant(NamedTuple):
     def neighbour(self, i: int, height: float, thrust: float) -> NeighbourState:
         """Return its state as the i-th of a row of vehicles."""
         place, mass = (i * SPACING, 0.0, height), self.p.body.mass
-        like = presence(self.p.effects)
-        return like._replace(
+        example = presence(self.p.effects)
+        return example._replace(
             position_world=place, thrust_world=(0.0, 0.0, thrust), mass=mass, air_density=STANDARD_DENSITY
         )
 

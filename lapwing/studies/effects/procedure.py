@@ -9,9 +9,10 @@ import numpy as np
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics import effects
 from lapwing.dynamics.effects._vehicle_interaction import INTERACTION
+from lapwing.flights.flight_data import FlightData
 from lapwing.services.autopilot.schema import Autopilot
 from lapwing.services.common.firmware.schema import require_own_autopilot
-from lapwing.services.common.vehicle_schema import Vehicle
+from lapwing.services.common.schemas.vehicle_schema import Vehicle
 from lapwing.studies.effects.cost import costs
 from lapwing.studies.effects.variants import (
     Change,
@@ -24,7 +25,6 @@ from lapwing.studies.effects.variants import (
     variant_pool,
     without,
 )
-from lapwing.studies.flight_data import FlightData
 
 
 class Influence(NamedTuple):

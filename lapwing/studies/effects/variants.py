@@ -12,10 +12,10 @@ from typing import Any, NamedTuple
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics import effects
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.flights.flight_data import FlightData
 from lapwing.messages.topics import TRUTH
-from lapwing.services.common.vehicle_schema import Effects
+from lapwing.services.common.schemas.vehicle_schema import Effects
 from lapwing.services.scene_resolver import resolve
-from lapwing.studies.flight_data import FlightData
 from lapwing.studies.simulate import fly_each
 from lapwing.studies.workers import workers
 

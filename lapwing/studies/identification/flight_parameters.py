@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from lapwing.studies.flight_import.recording import Recording
+from lapwing.flights.log_import.recording import Recording
 
 COMMAND_DELAY = "flight.command_delay"  # [s] from a logged command to the motors
 GYROSCOPE_OFFSET = "flight.gyroscope_offset"  # [rad/s] measured minus true, about each body axis

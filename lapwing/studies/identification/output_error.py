@@ -14,10 +14,10 @@ import numpy as np
 from scipy.ndimage import correlate1d
 from scipy.optimize import least_squares
 
-from lapwing.studies.flight_import.recording import Recording
+from lapwing.flights.log_import.recording import Recording
+from lapwing.flights.rotation_arrays import continuous, unit
 from lapwing.studies.identification.flight_parameters import apply_flight_parameters, is_flight_parameter
 from lapwing.studies.identification.instrumental_variables import LOSS_SCALE, Moments, loss, moments
-from lapwing.studies.rotation_arrays import continuous, unit
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.start_states import NO_TRIM, TrimMemory, start_states
 from lapwing.studies.validation.windows import Errors, Span, compare, predict_all, window_starts
@@ -65,6 +65,7 @@ class OutputError:
         windows: int = 1500,
         memory: TrimMemory = NO_TRIM,
         horizons: tuple[int, ...] = HORIZONS,
+        fields: tuple[str, ...] = FIELDS,
     ):
         """Select windows with minimum overlap.
 
@@ -76,7 +77,9 @@ class OutputError:
             windows: approximate number of windows.
             memory: memory of the trim.
             horizons: samples after which errors count.
+            fields: fields of `Errors` that count.
         """
+        self.fields = fields
         self.plant, self.flights, self.keys = plant, list(flights), tuple(keys)
         self.start, self.memory, self.horizons = np.array(start, float), memory, horizons
         self.scale = np.where(self.start != 0.0, np.abs(self.start), 1e-2)
@@ -86,10 +89,10 @@ class OutputError:
             raise ValueError("no flight has a valid window in the air; use flights that leave the ground")
         stride = max(1, total // windows)
         self.windows = [Window(k, a[stride // 2 :: stride]) for k, a in enumerate(available) if len(a)]
-        self.weights = np.ones((len(horizons), len(FIELDS)))
+        self.weights = np.ones((len(horizons), len(fields)))
         self.weights = 1.0 / self._scales()
         self.evaluations = 0
-        self._count = sum(len(w.starts) for w in self.windows) * len(horizons) * len(FIELDS) * 3
+        self._count = sum(len(w.starts) for w in self.windows) * len(horizons) * len(fields) * 3
 
     def _scales(self) -> np.ndarray:
         """Return the spread of the errors at the initial values by horizon and field, the scales of the residuals."""
@@ -98,7 +101,7 @@ class OutputError:
             return np.maximum(np.nanmedian(np.abs(residual), axis=(0, 3)) * 1.4826, 1e-9)
 
     def residuals(self, sets: Sequence[np.ndarray], samples: tuple[int, ...] = START) -> list[np.ndarray]:
-        """Return scaled residuals of each parameter set, shape (windows, h, 4, 3)."""
+        """Return scaled residuals of each parameter set, shape (windows, h, fields, 3)."""
         return [errors * self.weights[None, :, :, None] for errors in self._errors(sets, samples)]
 
     def derivatives(self, x: np.ndarray, samples: tuple[int, ...] = START) -> tuple[np.ndarray, np.ndarray]:
@@ -122,7 +125,7 @@ class OutputError:
             spans = [Span(w.flight, w.starts, j) for j in range(len(members)) for w in self.windows]
             result = predict_all(self.plant, [smooth_motion(f, samples) for f in flights], spans, states, self.horizons)
             parts = [
-                _stack(compare(flights[s.flight], s.starts, self.horizons, f))
+                _stack(compare(flights[s.flight], s.starts, self.horizons, f), self.fields)
                 for s, f in zip(spans, result, strict=True)
             ]
             for j, i in enumerate(members):
@@ -213,9 +216,9 @@ def smooth_motion(flight: Recording, samples: tuple[int, ...] = START) -> Record
     )  # fmt: skip
 
 
-def _stack(e: Errors) -> np.ndarray:
-    """Return the errors of all fields, shape (n, h, 4, 3)."""
-    return np.stack([getattr(e, name) for name in FIELDS], axis=2)
+def _stack(e: Errors, fields: tuple[str, ...]) -> np.ndarray:
+    """Return the errors of some fields, shape (n, h, fields, 3)."""
+    return np.stack([getattr(e, name) for name in fields], axis=2)
 
 
 def _flat(residual: np.ndarray) -> np.ndarray:

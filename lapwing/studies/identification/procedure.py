@@ -5,7 +5,6 @@ import json
 import tomllib
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import compress
 from pathlib import Path
 from typing import Any
 
@@ -13,21 +12,35 @@ import numpy as np
 
 from lapwing.cosim.complete_file import write_text
 from lapwing.cosim.scene import Overrides, Scene
+from lapwing.cosim.scene.toml_text import dump
 from lapwing.dynamics.config_error import did_you_mean
-from lapwing.services.common.vehicle_schema import VehicleAirframe
+from lapwing.flights.log_import.recording import Recording
+from lapwing.services.common.schemas.vehicle_schema import VehicleAirframe, airframe
 from lapwing.services.scene_resolver import load_one
-from lapwing.studies.flight_import.recording import Recording
+from lapwing.studies.campaign import posterior
+from lapwing.studies.campaign.distributions import lognormal, normal
 from lapwing.studies.identification.flight_parameters import KEYS, apply_flight_parameters, is_flight_parameter
-from lapwing.studies.identification.output_error import HORIZONS, Fit, OutputError
-from lapwing.studies.toml_text import dump
+from lapwing.studies.identification.output_error import FIELDS, HORIZONS, Fit, OutputError
 from lapwing.studies.validation.plant_rows import PlantRows
-from lapwing.studies.validation.prediction_metrics import magnitudes, pool_flights
-from lapwing.studies.validation.procedure import USABLE, read_flights
-from lapwing.studies.validation.start_states import TrimMemory, start_states
-from lapwing.studies.validation.windows import compare, predict, window_starts, without_window
+from lapwing.studies.validation.procedure import (
+    STRIDE,
+    Validation,
+    compare_with_flights,
+    plant_of,
+    read_flights,
+    with_windows,
+)
+from lapwing.studies.validation.start_states import TrimMemory
+from lapwing.studies.validation.unmeasured_motion import (
+    trim_memory,
+    unknown_parameters,
+    unmeasured_motion,
+    with_made_up_motion,
+)
 
 HELD_OUT = 0.2  # share of the flights that are not used for estimation
-HORIZON = (50,)  # samples after which held-out flights are compared
+VAGUE = 0.5  # standard error over value above which a positive parameter is not drawn
+TEST_TIMES = (0.01, 0.1, 0.5)  # [s] after which held-out flights are compared
 
 
 @dataclass(frozen=True)
@@ -39,8 +52,9 @@ class Identification:
     used: tuple[str, ...]  # names of the flights used for estimation
     held_out: tuple[str, ...]  # names of the flights used for the test
     skipped: tuple[str, ...]  # a line for each excluded flight
-    before: np.ndarray  # mean absolute errors on held-out flights after 50 samples, in the order of the metrics
-    after: np.ndarray
+    before: Validation  # of the initial values on the held-out flights, or those used if there are none
+    after: Validation
+    unknown: tuple[str, ...] = ()  # what flights without positions do not determine, a line each
 
 
 def identify(
@@ -78,18 +92,19 @@ def identify(
     """
     base = load_one(scene, overrides)
     start = [start_value(base, key) for key in keys]
-    flights, skipped = read_flights(paths, mapping, report)
-    airborne = [len(window_starts(r, HORIZON[-1], 1)) > 0 for r in flights]
-    recordings = list(compress(flights, airborne))
-    unused = [without_window(r) for r, flies in zip(flights, airborne, strict=True) if not flies]
-    if not recordings:
-        raise ValueError(f"{unused[0]}; {USABLE}")
-    skipped += unused
-    test_indices = _held_out(len(recordings), seed)
-    used = [r for k, r in enumerate(recordings) if k not in test_indices]
-    held_out = [r for k, r in enumerate(recordings) if k in test_indices]
-    plant = PlantRows(base, recordings[0].interval)
-    problem = OutputError(plant, used, keys, start, windows, memory, horizons)
+    recordings, skipped = read_flights(paths, mapping, report)
+    recordings = [r.in_volts(airframe(base).motor.max_voltage) for r in recordings]
+    test_horizons = tuple(sorted({max(1, round(time / recordings[0].interval)) for time in TEST_TIMES}))
+    missing = unmeasured_motion(recordings)
+    fields = tuple(f for f in FIELDS if f not in missing) + (("specific_force",) if missing else ())
+    unknown, memory = unknown_parameters(recordings, missing), trim_memory(memory, missing)
+    recordings = [with_made_up_motion(r, missing) for r in recordings]
+    flights, unused = with_windows(recordings, max(horizons[-1], test_horizons[-1]))
+    test_indices = _held_out(len(flights), seed)
+    used = [r for k, r in enumerate(flights) if k not in test_indices]
+    held_out = [r for k, r in enumerate(flights) if k in test_indices]
+    plant = plant_of(base, flights)
+    problem = OutputError(plant, used, keys, start, windows, memory, horizons, fields)
     stamp = _stamp(base, keys, [r.name for r in used], windows, seed, (memory, horizons))
     begin = _read_progress(progress, stamp)
 
@@ -99,20 +114,21 @@ def identify(
             write_text(progress, json.dumps({"stamp": stamp, "values": values.tolist()}))
 
     fit = problem.solve(begin, most, store)
-    test_flights = held_out or used
-    before = _errors(plant, test_flights, keys, np.array(start), memory)
-    after = _errors(plant, test_flights, keys, fit.values, memory)
+    name = str(getattr(base, "name", scene))
+    before, after = (
+        _test(name, plant, (held_out, used), keys, values, test_horizons, memory, missing)
+        for values in (np.array(start), fit.values)
+    )
     if progress:
         progress.unlink(missing_ok=True)
-    name = str(getattr(base, "name", scene))
     names, test_names = tuple(r.name for r in used), tuple(r.name for r in held_out)
-    return Identification(name, fit, names, test_names, tuple(skipped), before, after)
+    return Identification(name, fit, names, test_names, (*skipped, *unused), before, after, unknown)
 
 
 def write_airframe(
     path: Path, scene: Scene | str | Path, identification: Identification, overrides: Overrides = ()
 ) -> None:
-    """Write the scene's airframe with the estimated values, and those of effects as comments for the scene."""
+    """Write the scene's airframe with the estimated values, those of effects as comments, and their posterior."""
     base = load_one(scene, overrides)
     table = base[VehicleAirframe].model_dump(mode="json", exclude_none=True, exclude_defaults=True)
     table |= {"mass": base[VehicleAirframe].mass.model_dump(mode="json")}
@@ -136,9 +152,25 @@ def write_airframe(
     if others:
         lines.append("# For the scene, in addition to vehicle.airframe:")
         lines += [f"#   {key} = {value:.9g}" for key, value in others.items()]
-    text = "\n".join(lines) + "\n\n" + dump(table)
+    text = "\n".join(lines) + "\n\n" + dump(table | joint_distribution(identification.fit))
     tomllib.loads(text)
     write_text(path, text)
+
+
+def joint_distribution(fit: Fit) -> dict[str, Any]:
+    """Return the table with the posterior of the parameters of the scene, empty if the flights determine none.
+
+    Parameters of recordings are left out, those without influence, and positive ones whose standard errors exceed half
+    their values: the linearisation about the estimate does not hold so far from it.
+    """
+    limit = np.where(fit.start > 0.0, VAGUE * np.abs(fit.values), np.inf)
+    own = [k for k, key in enumerate(fit.keys) if not is_flight_parameter(key) and fit.standard_errors[k] < limit[k]]
+    if not own:
+        return {}
+    kinds = {fit.keys[k]: lognormal.__name__ if fit.start[k] > 0.0 else normal.__name__ for k in own}
+    errors = fit.standard_errors[own]
+    covariance = fit.correlations[np.ix_(own, own)] * np.outer(errors, errors)
+    return {posterior.TABLE: posterior.table(kinds, fit.values[own], covariance)}
 
 
 def start_value(scene: Scene, key: str) -> float:
@@ -201,18 +233,24 @@ def _read_progress(progress: Path | None, stamp: str) -> np.ndarray | None:
     return np.array(content["values"], float) if content.get("stamp") == stamp else None
 
 
-def _errors(
-    plant: PlantRows, flights: list[Recording], keys: Sequence[str], values: np.ndarray, memory: TrimMemory
-) -> np.ndarray:
+def _test(
+    name: str,
+    plant: PlantRows,
+    flights: tuple[list[Recording], list[Recording]],
+    keys: Sequence[str],
+    values: np.ndarray,
+    horizons: tuple[int, ...],
+    memory: TrimMemory,
+    missing: tuple[str, ...],
+) -> Validation:
+    """Compare the plant of these values with the first of two groups of flights, or the second if that is empty."""
     own = {k: float(v) for k, v in zip(keys, values, strict=True)}
     plant.set_parameters([{k: v for k, v in own.items() if not is_flight_parameter(k)}])
-    corrected = [apply_flight_parameters(f, {k: v for k, v in own.items() if is_flight_parameter(k)}) for f in flights]
-    result = []
-    for flight, state in zip(corrected, start_states(plant, corrected, memory), strict=True):
-        starts = window_starts(flight, HORIZON[-1], 10)
-        predicted = predict(plant, flight, starts, state, HORIZON)
-        result.append(magnitudes(compare(flight, starts, HORIZON, predicted))[:, 0])
-    return np.array([m.mean for m in pool_flights([values[:, None] for values in result])[0]])
+    of_flights = {k: v for k, v in own.items() if is_flight_parameter(k)}
+    test, others = ([apply_flight_parameters(f, of_flights) for f in group] for group in flights)
+    if not test:
+        test, others = others, test
+    return compare_with_flights(name, plant, test, horizons, memory, STRIDE, others=others, unmeasured=missing)
 
 
 def _put(table: Any, keys: list[str], value: float) -> None:

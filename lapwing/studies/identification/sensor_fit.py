@@ -14,10 +14,10 @@ import numpy as np
 
 from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.geodesy import Home, geodetic_to_enu
+from lapwing.flights.log_import.recording import Recording, Series
+from lapwing.flights.log_import.time_alignment import time_offset
+from lapwing.flights.rotation_arrays import body_rate
 from lapwing.services.sensors.delay_line import DEPTH
-from lapwing.studies.flight_import.recording import Recording, Series
-from lapwing.studies.flight_import.time_alignment import time_offset
-from lapwing.studies.rotation_arrays import body_rate
 
 SHORTEST_REST = 2.0  # [s] minimum time without motor commands that counts as rest
 LONG_REST = 100.0  # [s] minimum rest for the estimation of slow errors of the IMU

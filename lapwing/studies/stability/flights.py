@@ -5,10 +5,10 @@ from typing import Any
 
 import numpy as np
 
+from lapwing.flights.flight_data import FlightData
 from lapwing.messages.topics import TRUTH
 from lapwing.services.scene_resolver import load
 from lapwing.studies import simulate
-from lapwing.studies.flight_data import FlightData
 
 
 def fly(scene: str, overrides: Iterable[str] = (), topics: Any = (TRUTH,)) -> FlightData:

@@ -11,12 +11,12 @@ from lapwing.cosim.scene import Scene
 from lapwing.dynamics import effects
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.ground_equilibrium import static_equilibrium
+from lapwing.flights.metrics import metrics
 from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.common.autopilot_parameters import gain_parameters
-from lapwing.services.common.environment_schema import environment
-from lapwing.services.common.vehicle_schema import Effects, airframe, gravity, start_pose
+from lapwing.services.common.schemas.environment_schema import environment
+from lapwing.services.common.schemas.vehicle_schema import Effects, airframe, gravity, start_pose
 from lapwing.studies.campaign.campaign_config import TOPICS
-from lapwing.studies.metrics import metrics
 from lapwing.studies.simulate import fly
 
 DEVIATION = 0.2  # of the nominal value
@@ -36,9 +36,9 @@ class Corner(NamedTuple):
 CORNERS = [Corner(*signs) for signs in product((1.0 - DEVIATION, 1.0 + DEVIATION), repeat=3)]
 
 
-def metrics_of(setup: RunConfig) -> dict[str, Any]:
+def metrics_of(config: RunConfig) -> dict[str, Any]:
     """Return the metrics of a flight."""
-    return metrics(fly(setup, TOPICS))
+    return metrics(fly(config, TOPICS))
 
 
 def failure(flight: Mapping[str, Any]) -> str:
@@ -46,14 +46,14 @@ def failure(flight: Mapping[str, Any]) -> str:
     return "" if flight["outcome"] in ("landed", "completed") else str(flight["outcome_text"])
 
 
-def with_gains(setup: RunConfig, gains: GainSet) -> RunConfig:
+def with_gains(config: RunConfig, gains: GainSet) -> RunConfig:
     """Return the run with another gain set, which also replaces gains changed by the scene's parameters."""
-    present, changed = setup.services["autopilot"].parameters, {p.name: p for p in gain_parameters(gains)}
+    present, changed = config.services["autopilot"].parameters, {p.name: p for p in gain_parameters(gains)}
     parameters = tuple(changed.get(p.name, p) for p in present.parameters)
-    return _with(setup, "autopilot", present._replace(gains=gains.plain(), parameters=parameters))
+    return _with(config, "autopilot", present._replace(gains=gains.plain(), parameters=parameters))
 
 
-def with_vehicle(setup: RunConfig, scene: Scene, corner: Corner) -> RunConfig:
+def with_vehicle(config: RunConfig, scene: Scene, corner: Corner) -> RunConfig:
     """Return the run with a vehicle that differs from the autopilot's model."""
     frame = airframe(scene)
     mass = frame.mass.model_copy(
@@ -67,14 +67,14 @@ def with_vehicle(setup: RunConfig, scene: Scene, corner: Corner) -> RunConfig:
     active = effects.from_scene(scene[Effects].tables, frame, environment(scene))
     modified = tuple(_stronger(e, corner.thrust) for e in active)
     p = multirotor.parameters(frame, modified)
-    plant = setup.services["plant"].parameters
+    plant = config.services["plant"].parameters
     start = plant.start._replace(vehicle=static_equilibrium(multirotor, p, start_pose(scene), gravity(scene)))
-    return _with(setup, "plant", plant._replace(core=plant.core._replace(vehicle=p), start=start))
+    return _with(config, "plant", plant._replace(core=plant.core._replace(vehicle=p), start=start))
 
 
-def _with(setup: RunConfig, name: str, parameters: Any) -> RunConfig:
-    changed = setup.services[name]._replace(parameters=parameters)
-    return setup._replace(services={**setup.services, name: changed})
+def _with(config: RunConfig, name: str, parameters: Any) -> RunConfig:
+    changed = config.services[name]._replace(parameters=parameters)
+    return config._replace(services={**config.services, name: changed})
 
 
 def _stronger(effect: Any, factor: float) -> Any:

@@ -7,7 +7,7 @@ import numpy as np
 
 from lapwing.services.autopilot.controller_parameters import Airframe, build, lift, moments
 from lapwing.services.autopilot.gains import GainSet
-from lapwing.services.autopilot.margins import FREQUENCIES, margins, open_loops, stable
+from lapwing.services.autopilot.margins import FREQUENCIES, LOOP_WORDS, margins, open_loops, stable
 from lapwing.studies.tune.bandwidths import Bandwidths
 from lapwing.studies.tune.linearise import Hover
 
@@ -102,13 +102,12 @@ def design(
         slower = {}
         for name, why in faults.items():
             loop = _owner(name, faults)
-            first_faults.setdefault(loop, f"{name}: {why}")
+            first_faults.setdefault(loop, f"{LOOP_WORDS[name]}: {why}")
             slower[loop] = BACK_OFF * getattr(current, loop)
         current = current._replace(**slower)
     name, why = next(iter(faults.items()))
-    raise ValueError(
-        f"no gains with {PHASE_MARGIN:g} deg and {GAIN_MARGIN:g} dB found: {name}: {why}; use lower bandwidths"
-    )
+    fault = f"{LOOP_WORDS[name]}: {why}"
+    raise ValueError(f"no gains with {PHASE_MARGIN:g} deg and {GAIN_MARGIN:g} dB found: {fault}; use lower bandwidths")
 
 
 def _owner(name: str, faults: dict[str, str]) -> str:

@@ -7,18 +7,18 @@ import numpy as np
 from scipy.optimize import minimize
 
 from lapwing.cosim.scene import Scene
+from lapwing.flights.tracking import AXES
 from lapwing.services.autopilot.controller_parameters import Airframe, build
 from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.autopilot.margins import open_loops
 from lapwing.services.scene_resolver import reseed
-from lapwing.studies.campaign.campaign_config import campaign_setup
-from lapwing.studies.tracking import AXES
+from lapwing.studies.campaign.campaign_config import campaign_config
 from lapwing.studies.tune.bandwidths import Bandwidths
 from lapwing.studies.tune.corners import metrics_of, with_gains
 from lapwing.studies.tune.design import DELAY, assumed_airframe, gain_set, shortfalls
 from lapwing.studies.tune.linearise import Hover
 
-Figures = dict[str, Any]  # metrics by name, see `lapwing.studies.metrics`
+Figures = dict[str, Any]  # metrics by name, see `lapwing.flights.metrics`
 
 CANDIDATES = 60  # largest number of gain sets
 FIRST_STEP = 0.1  # initial step of the logarithm of every bandwidth
@@ -52,13 +52,13 @@ def refine(
     The objective is the mean over the axes of the RMSE over that of `start`. A gain set that does not land or lacks a
     margin is worse than any that flies. Deterministic: equal scenes return equal gains.
     """
-    plant, setup = assumed_airframe(airframe, model), campaign_setup(scene)
+    plant, config = assumed_airframe(airframe, model), campaign_config(scene)
     valid: dict[float, tuple[Bandwidths, GainSet, list[Figures]]] = {}
 
     def fly(gains: GainSet) -> list[Figures]:
         progress()
-        run = with_gains(setup, gains)
-        return [metrics_of(reseed(run, setup.seed + k)) for k in range(SEEDS)]
+        run = with_gains(config, gains)
+        return [metrics_of(reseed(run, config.seed + k)) for k in range(SEEDS)]
 
     before = fly(gain_set(model, start))
     judged_axes = [axis for axis in AXES if rmse(before, axis) > MIN_RMSE]

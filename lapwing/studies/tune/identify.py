@@ -11,8 +11,8 @@ import numpy as np
 from scipy.optimize import minimize_scalar
 from scipy.signal import bilinear, lfilter
 
+from lapwing.flights.flight_data import FlightData
 from lapwing.services.autopilot.control import Parameters
-from lapwing.studies.flight_data import FlightData
 from lapwing.studies.tune.linearise import Hover
 
 FILTER_BANDWIDTH = 60.0  # [rad/s] above the loops' bandwidths

@@ -12,8 +12,8 @@ from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion, from_roll_p
 from lapwing.dynamics.vehicles.multirotor import initial_state, observe, parameters
 from lapwing.services.autopilot.controller_parameters import shares
 from lapwing.services.autopilot.nominal_airframe import known_airframe
-from lapwing.services.common.environment_schema import environment
-from lapwing.services.common.vehicle_schema import Effects, airframe
+from lapwing.services.common.schemas.environment_schema import environment
+from lapwing.services.common.schemas.vehicle_schema import Effects, airframe
 
 HEIGHT = 50.0  # [m] above the ground effect
 INTERVAL = 0.004  # [s] without influence, since the tick is 0

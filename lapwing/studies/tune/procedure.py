@@ -6,19 +6,19 @@ from typing import NamedTuple
 
 from lapwing.cosim.complete_file import write_text
 from lapwing.cosim.scene import Scene
+from lapwing.cosim.scene.toml_text import dump
+from lapwing.flights.flight_data import FlightData
 from lapwing.services.autopilot.control import Parameters
 from lapwing.services.autopilot.controller_parameters import Airframe, build
 from lapwing.services.autopilot.gains import GainSet
-from lapwing.services.autopilot.margins import Margins, margins, open_loops
+from lapwing.services.autopilot.margins import LOOP_WORDS, Margins, margins, open_loops
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.autopilot.schema import Autopilot
-from lapwing.services.common.communication_schema import Communication
 from lapwing.services.common.firmware.schema import require_own_autopilot
-from lapwing.services.common.run_schema import follows_trajectory
-from lapwing.services.common.vehicle_schema import Vehicle
-from lapwing.studies.campaign.campaign_config import campaign_setup
-from lapwing.studies.flight_data import FlightData
-from lapwing.studies.toml_text import dump
+from lapwing.services.common.schemas.communication_schema import Communication
+from lapwing.services.common.schemas.run_schema import follows_trajectory
+from lapwing.services.common.schemas.vehicle_schema import Vehicle
+from lapwing.studies.campaign.campaign_config import campaign_config
 from lapwing.studies.tune import corners, gain_refinement
 from lapwing.studies.tune.bandwidths import Bandwidths
 from lapwing.studies.tune.design import DELAY, assumed_airframe, design, gain_set, shortfalls
@@ -57,7 +57,7 @@ class Tuning(NamedTuple):
     @property
     def failures(self) -> list[str]:
         """Loops of the new gains without the required margins, and failed flights of perturbed vehicles."""
-        loops = [f"{name}: {why}" for name, why in self.after.shortfalls.items()]
+        loops = [f"{LOOP_WORDS[name]}: {why}" for name, why in self.after.shortfalls.items()]
         return loops + [f"{corner}: {corners.failure(flight)}" for corner, flight in self.corners.items()
                         if corners.failure(flight)]  # fmt: skip
 
@@ -88,22 +88,22 @@ def tune(
     for name, value in initial._asdict().items():
         if not 0.0 < value < float("inf"):
             raise ValueError(f"--{name} {value:g}: expected a bandwidth above 0 rad/s")
-    airframe, tick, config = known_airframe(scene), scene[Communication].interval, scene[Autopilot]
+    airframe, tick, settings = known_airframe(scene), scene[Communication].interval, scene[Autopilot]
     present = build(scene[GainSet].plain(), airframe)
     compiled_model = hover(scene)
     identification = identify(FlightData.read(log), present, compiled_model) if log else None
     model = identification.model if identification else compiled_model
     plant = assumed_airframe(airframe, model)
-    before = _review(config.gains, present, plant, tick)
+    before = _review(settings.gains, present, plant, tick)
     for name, why in before.shortfalls.items():
-        warn(f"warning: present gains {config.gains} of the scene: {name}: {why}")
+        warn(f"warning: present gains {settings.gains} of the scene: {LOOP_WORDS[name]}: {why}")
     bandwidths = design(model, airframe, tick, initial, warn)
     gains, refinement, corner_flights = gain_set(model, bandwidths), None, {}
-    if follows_trajectory(scene) and scene[Vehicle].model == "rigid_body" and not config.accept_commands:
+    if follows_trajectory(scene) and scene[Vehicle].model == "rigid_body" and not settings.accept_commands:
         refinement = gain_refinement.refine(scene, model, airframe, tick, bandwidths, progress)
         gains = refinement.gains
-        setup = corners.with_gains(campaign_setup(scene), gains)
-        corner_flights = {c: corners.metrics_of(corners.with_vehicle(setup, scene, c)) for c in corners.CORNERS}
+        config = corners.with_gains(campaign_config(scene), gains)
+        corner_flights = {c: corners.metrics_of(corners.with_vehicle(config, scene, c)) for c in corners.CORNERS}
     else:
         warn("gains are not refined: the autopilot of the scene does not follow a [trajectory]")
     after = _review("new", build(gains.plain(), airframe), plant, tick)

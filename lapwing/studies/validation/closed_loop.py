@@ -11,11 +11,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lapwing.cosim.scene import Overrides, Scene
+from lapwing.flights.flight_data import FlightData
+from lapwing.flights.log_import.recording import LOWEST, Recording
 from lapwing.messages.topics import TRUTH
 from lapwing.services.scene_resolver import load_one
 from lapwing.studies import simulate
-from lapwing.studies.flight_data import FlightData
-from lapwing.studies.flight_import.recording import LOWEST, Recording
 
 SHORTEST = 3.0  # [s] minimum duration of the setpoints
 TABLE_STEP = 0.04  # [s] between two points of the trajectory

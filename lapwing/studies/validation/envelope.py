@@ -5,7 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import welch
 
-from lapwing.studies.rotation_arrays import conjugate, rotate
+from lapwing.flights.rotation_arrays import conjugate, rotate
 from lapwing.studies.validation.prediction_metrics import magnitudes
 from lapwing.studies.validation.procedure import FlightErrors, Validation
 
@@ -94,7 +94,7 @@ def explanations(validation: Validation) -> list[Explanation]:
         matrix = np.concatenate(parts)
         if not matrix.shape[1]:
             matrix = np.eye(len(validation.flights))[owner]
-        if np.isfinite(matrix).all():
+        if np.isfinite(matrix).all() and np.ptp(matrix, axis=0).any():  # made-up motion is constant
             out.append(Explanation(cause, _share(matrix, residual[:, :3]), _share(matrix, residual[:, 3:])))
     return sorted(out, key=lambda e: -(e.force + e.torque))
 

@@ -1,25 +1,30 @@
 """Best linear prediction: a regression from the start state and the commands of the window to the change of state.
 
 It uses no physical model. Where it predicts better than the plant, the model misses an effect that is in the data. Each
-flight is predicted by coefficients fitted to the other flights.
+flight is predicted by coefficients fitted to the other flights, and a part of a single flight by those of the rest.
 """
 
 from itertools import pairwise
 
 import numpy as np
 
-from lapwing.studies.flight_import.recording import Recording
-from lapwing.studies.rotation_arrays import conjugate, from_vector, product, rotate, rotation_vector
+from lapwing.flights.log_import.recording import Recording
+from lapwing.flights.rotation_arrays import conjugate, from_vector, product, rotate, rotation_vector
 from lapwing.studies.validation.windows import POWER, WIDTH, Errors, compare
 
 SLICE = 5  # samples of commands averaged by one regressor
 RIDGE = 1e-3  # ridge parameter over the number of windows, for standardised regressors
+PARTS = 5  # of a single flight
 SMALLEST = 1e-6  # [SI] standard deviation of a regressor below which it counts as constant
 UP = np.array([0.0, 0.0, 1.0])
 
 
 def linear_fit(flights: list[Recording], starts: list[np.ndarray], horizons: tuple[int, ...]) -> list[Errors]:
-    """Return the errors of the linear prediction of each flight by a fit to the others (one flight: to itself)."""
+    """Return the errors of the linear prediction of each flight by a fit to the others."""
+    if len(flights) == 1 and len(starts[0]) > 1:
+        parts = np.array_split(starts[0], min(PARTS, len(starts[0])))
+        errors = linear_fit(flights * len(parts), parts, horizons)
+        return [Errors(*map(np.concatenate, zip(*errors, strict=True)))]
     regressors = [_regressors(f, s, horizons[-1]) for f, s in zip(flights, starts, strict=True)]
     targets = [_targets(f, s, horizons) for f, s in zip(flights, starts, strict=True)]
     spread = np.concatenate(regressors).std(axis=0)
@@ -30,10 +35,8 @@ def linear_fit(flights: list[Recording], starts: list[np.ndarray], horizons: tup
     whole, whole_product, count = moments.sum(axis=0), sum(products), sum(map(len, starts))
     out = []
     for k, (flight, s) in enumerate(zip(flights, starts, strict=True)):
-        is_single = len(flights) == 1
-        moment = whole if is_single else whole - moments[k]
-        right = whole_product if is_single else whole_product - products[k]
-        gain = np.linalg.solve(moment + RIDGE * count * np.eye(len(moment)), right)
+        moment = whole - moments[k] + RIDGE * count * np.eye(len(whole))
+        gain = np.linalg.solve(moment, whole_product - products[k])
         change = (regressors[k] @ gain).reshape(len(s), len(horizons), 12)
         out.append(compare(flight, s, horizons, _predict(flight, s, horizons, change)))
     return out

@@ -15,8 +15,8 @@ from lapwing.dynamics.effects._types import Motion
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, evaluate, motion_of
 from lapwing.kernels import kernel
 from lapwing.kernels.row_packing import pack_row, row_width
-from lapwing.services.common.communication_schema import Communication, Rates
-from lapwing.services.common.vehicle_schema import Effects, airframe
+from lapwing.services.common.schemas.communication_schema import Communication, Rates
+from lapwing.services.common.schemas.vehicle_schema import Effects, airframe
 from lapwing.services.plant.blocks.multirotor import MultirotorPlant
 from lapwing.services.plant.resolve import resolve
 from lapwing.services.plant.schema import Solver
@@ -58,14 +58,15 @@ class PlantRows:
         steps = int(np.ceil(interval / LONGEST_STEP - 1e-9))
         self.interval = interval
         self._base = _with_wrench(load_one(scene, overrides))
+        self.full_voltage = airframe(self._base).motor.max_voltage
         self._rate, self._step = rate, interval / steps
         first = _plant(self._scene({}))
         self._core = first.core
-        self.like = simd_batch.member(first.core.vehicle, first.start.vehicle)
-        self.motion = row_width(self.like.motion)
-        self.rotors = len(self.like.voltage)
+        self.example = simd_batch.member(first.core.vehicle, first.start.vehicle)
+        self.motion = row_width(self.example.motion)
+        self.rotors = len(self.example.voltage)
         self._pool = ThreadPoolExecutor(cpu_count())
-        base = pack_row(self.like)
+        base = pack_row(self.example)
         perturbed = [self._row({FORCE: [1.0, 0.0, 0.0]}), self._row({TORQUE: [1.0, 0.0, 0.0]})]
         columns = [int(np.flatnonzero(row != base)[0]) for row in perturbed]
         self._force, self._torque = (slice(c, c + 3) for c in columns)
@@ -81,7 +82,7 @@ class PlantRows:
     @property
     def speed_per_volt(self) -> float:
         """Steady rotor speed over motor voltage [rad/(s V)] of the first parameter set."""
-        return float(self.like.parameters.layout.speed_per_volt)
+        return float(self.example.parameters.layout.speed_per_volt)
 
     def start(self, sets: np.ndarray) -> np.ndarray:
         """Return blocks of initial vehicles for indices of parameter sets, shape (blocks, columns, lanes)."""
@@ -136,8 +137,8 @@ class PlantRows:
 
         def work(k: int) -> None:
             simd_batch.advance_along(
-                core.method, self.like, flat, columns, keys, exchanges, commands, reset, trace, core.step, core.steps,
-                edges[k], edges[k + 1],
+                core.method, self.example, flat, columns, keys, exchanges, commands, reset, trace, core.step,
+                core.steps, edges[k], edges[k + 1],
             )  # fmt: skip
 
         if parts == 1:
@@ -149,7 +150,7 @@ class PlantRows:
     def power(self, blocks: np.ndarray, n: int) -> np.ndarray:
         """Return the electrical power [W] of the first n vehicles after their last tick, shape (n,)."""
         out = np.empty(len(blocks) * LANES)
-        _electrical_power(self.like, blocks.reshape(-1), blocks.shape[1], out, 0, len(blocks))
+        _electrical_power(self.example, blocks.reshape(-1), blocks.shape[1], out, 0, len(blocks))
         return out[:n]
 
     def _scene(self, values: Mapping[str, Any]) -> Scene:
@@ -176,11 +177,11 @@ class PlantRows:
 
 
 @kernel
-def _electrical_power(like: Any, memory: Any, columns: int, out: Any, first: int, last: int) -> None:
+def _electrical_power(example: Any, memory: Any, columns: int, out: Any, first: int, last: int) -> None:
     """Write the power [W] of the motors of each member at its last voltages.
 
     Args:
-        like: prototype, a Member of `lapwing.dynamics.simd_batch`.
+        example: prototype, a Member of `lapwing.dynamics.simd_batch`.
         memory: blocks of the batch, flat.
         columns: number of columns of a block.
         out: result, shape (members,).
@@ -188,7 +189,7 @@ def _electrical_power(like: Any, memory: Any, columns: int, out: Any, first: int
         last: block after the last.
     """
     for m in range(first * LANES, last * LANES):
-        x = simd_batch.take(like, memory, (m // LANES) * columns * LANES + m % LANES)
+        x = simd_batch.take(example, memory, (m // LANES) * columns * LANES + m % LANES)
         drive = MultirotorDrive(x.parameters, x.body, x.memory, x.voltage)
         _, rotors, _, _ = evaluate(drive, x.start, motion_of(x.parameters.layout, x.motion))
         out[m] = total(rotors.power)

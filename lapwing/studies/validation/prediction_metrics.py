@@ -1,20 +1,26 @@
-"""Mean absolute prediction errors over windows, with confidence intervals over flights."""
+"""Mean absolute prediction errors over windows, with confidence intervals over flights or parts of them."""
 
+import warnings
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
+from scipy.stats import t as student
 
-from lapwing.studies.flight_import.recording import Recording
-from lapwing.studies.rotation_arrays import from_vector, product
+from lapwing.flights.log_import.recording import Recording
+from lapwing.flights.rotation_arrays import from_vector, product
 from lapwing.studies.validation.windows import POWER, WIDTH, Errors, compare
 
 FIELDS = ("position", "velocity", "attitude", "rate", "specific_force", "power")
-RESAMPLES = 2000  # number of bootstrap samples over flights
-CONFIDENCE = 95.0  # [%]
+RESAMPLES = 2000  # number of bootstrap samples over clusters
+CONFIDENCE = 0.95
+FEWEST_CLUSTERS = 3  # for an interval
+FEWEST_FLIGHTS = 8  # for intervals over flights
+BLOCK = 2.0  # [s] of flight that counts as one independent observation if there are fewer flights
 
 
 class Metric(NamedTuple):
-    """A mean over windows and its confidence interval over flights."""
+    """A mean or ratio of means over windows, and its confidence interval over clusters of windows."""
 
     mean: float
     low: float
@@ -32,30 +38,69 @@ def magnitudes(errors: Errors) -> np.ndarray:
     return np.stack([*means, angle, *rest], axis=-1)
 
 
-def pool_flights(flights: list[np.ndarray], seed: int = 1) -> list[list[Metric]]:
-    """Return the mean over all windows by horizon and field, and its confidence interval by a bootstrap over flights.
+def clusters(starts: Sequence[np.ndarray], interval: float) -> np.ndarray:
+    """Return the index of the cluster of each window of all flights.
 
-    Flights are independent, windows of one flight are not. Intervals of fewer than three flights are NaN.
+    Flights are independent, windows of one flight are not. A few flights say little about others: fewer than
+    `FEWEST_FLIGHTS` are split into blocks of `BLOCK`, whose interval is for flights like these.
 
     Args:
-        flights: magnitudes of each flight, shape (n, h, fields).
-        seed: seed of the bootstrap.
+        starts: first samples of the windows of each flight.
+        interval: duration of a sample [s].
     """
-    total = np.array([np.nansum(f, axis=0) for f in flights])
-    count = np.array([np.isfinite(f).sum(axis=0) for f in flights])
-    with np.errstate(invalid="ignore", divide="ignore"):
-        mean = total.sum(axis=0) / count.sum(axis=0)
-        low, high = np.full_like(mean, np.nan), np.full_like(mean, np.nan)
-        if len(flights) >= 3:
-            draws = np.random.default_rng(seed).integers(0, len(flights), (RESAMPLES, len(flights)))
-            weights = np.stack([np.bincount(d, minlength=len(flights)) for d in draws]).astype(float)
-            sampled = np.tensordot(weights, total, 1) / np.tensordot(weights, count, 1)
-            tail = (100.0 - CONFIDENCE) / 2.0
-            known = np.isfinite(mean)  # a quantity that no flight has measured has no interval
-            low[known], high[known] = np.nanpercentile(sampled[:, known], [tail, 100.0 - tail], axis=0)
+    length = np.inf if len(starts) >= FEWEST_FLIGHTS else BLOCK / interval
+    names = [k * 1_000_000 + s // length for k, s in enumerate(starts)]
+    return np.unique(np.concatenate(names), return_inverse=True)[1]
+
+
+def pool(values: np.ndarray, cluster: np.ndarray) -> list[list[Metric]]:
+    """Return the mean over all windows by horizon and field; windows without the quantity do not count.
+
+    Args:
+        values: magnitudes of all windows, shape (n, h, fields).
+        cluster: index of the cluster of each window, shape (n,).
+    """
+    return _metrics(_sums(values, cluster), _sums(np.isfinite(values), cluster))
+
+
+def ratios(values: np.ndarray, baseline: np.ndarray, cluster: np.ndarray) -> list[list[Metric]]:
+    """Return the mean over windows divided by that of a baseline, by horizon and field. See `pool`.
+
+    Both are resampled together, so what makes a flight hard for both does not widen the interval.
+    """
+    known = np.isfinite(values) & np.isfinite(baseline)
+    return _metrics(*(_sums(np.where(known, v, np.nan), cluster) for v in (values, baseline)))
+
+
+def _sums(values: np.ndarray, cluster: np.ndarray) -> np.ndarray:
+    total = np.zeros((int(cluster.max()) + 1, *values.shape[1:]))
+    np.add.at(total, cluster, np.nan_to_num(values))
+    return total
+
+
+def _metrics(numerator: np.ndarray, denominator: np.ndarray) -> list[list[Metric]]:
+    """Return the ratio of the sums over clusters, with an interval by a bootstrap over clusters.
+
+    The logarithm of the ratio is resampled, and its spread scaled by Student's distribution: percentiles of so few
+    values as a handful of flights are too narrow.
+
+    Args:
+        numerator: sums of each cluster, shape (clusters, h, fields).
+        denominator: likewise.
+    """
+    draws = np.random.default_rng(1).integers(0, len(numerator), (RESAMPLES, len(numerator)))
+    weights = np.stack([np.bincount(d, minlength=len(numerator)) for d in draws]).astype(float)
+    count = (denominator > 0.0).sum(axis=0)
+    with np.errstate(invalid="ignore", divide="ignore"), warnings.catch_warnings():
+        warnings.simplefilter("ignore", RuntimeWarning)  # of quantities that no flight has measured
+        mean = numerator.sum(axis=0) / denominator.sum(axis=0)
+        sampled = np.log(np.tensordot(weights, numerator, 1) / np.tensordot(weights, denominator, 1))
+        deviation = np.nanstd(sampled, axis=0) * np.sqrt(count / (count - 1.0))
+        factor = np.exp(deviation * student.ppf(0.5 + 0.5 * CONFIDENCE, np.maximum(count - 1, 1)))
+    factor[count < FEWEST_CLUSTERS] = np.nan
     return [
-        [Metric(float(m), float(a), float(b)) for m, a, b in zip(*row, strict=True)]
-        for row in zip(mean, low, high, strict=True)
+        [Metric(*map(float, values)) for values in zip(*row, strict=True)]
+        for row in zip(mean, mean / factor, mean * factor, strict=True)
     ]
 
 

@@ -1,24 +1,35 @@
 """Validation of a scene's plant on recorded flights."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from itertools import compress
 from pathlib import Path
 
 import numpy as np
 
 from lapwing.cosim.scene import Overrides, Scene
-from lapwing.studies import json_file
-from lapwing.studies.flight_import.open_flight import open_flight
-from lapwing.studies.flight_import.recording import Recording
+from lapwing.flights.log_import.open_flight import open_flight
+from lapwing.flights.log_import.recording import Recording
 from lapwing.studies.validation.closed_loop import ClosedLoop, fly_setpoints
 from lapwing.studies.validation.linear_baseline import linear_fit
+from lapwing.studies.validation.measurement_noise import noisier
 from lapwing.studies.validation.plant_rows import PlantRows
-from lapwing.studies.validation.prediction_metrics import FIELDS, Metric, constant_velocity, magnitudes, pool_flights
+from lapwing.studies.validation.prediction_metrics import (
+    FIELDS,
+    Metric,
+    clusters,
+    constant_velocity,
+    magnitudes,
+    pool,
+    ratios,
+)
 from lapwing.studies.validation.start_states import USUAL_TRIM, StartStates, TrimMemory, start_states
+from lapwing.studies.validation.unmeasured_motion import trim_memory, unmeasured_motion, with_made_up_motion
 from lapwing.studies.validation.windows import Errors, compare, predict, thrust_ratio, window_starts, without_window
 
-USABLE = "use flights with position and attitude that leave the ground"
+USABLE = "use flights that leave the ground"
 STRIDE = 5  # samples between the starts of two windows
+THINNED = 4  # windows for each one that measures the effect of noise
 SAME_VEHICLE = 0.25  # largest difference of the thrust ratio from 1; 0.12 in 44 flights of one Crazyflie
 
 
@@ -43,8 +54,12 @@ class Validation:
     memory: TrimMemory
     flights: tuple[FlightErrors, ...]
     skipped: tuple[str, ...]  # a line for each flight that is excluded, or not simulated in closed loop
+    clusters: int  # number of independent parts: flights, or blocks of few flights
     plant: list[list[Metric]]  # by horizon and field
     baselines: dict[str, list[list[Metric]]]
+    ratios: dict[str, list[list[Metric]]]  # error of the plant over that of each baseline
+    noise: np.ndarray  # errors that the noise of the measurements alone causes, shape (horizons, fields)
+    missing: tuple[str, ...] = ()  # fields that the logs do not have
     closed_loop: tuple[ClosedLoop, ...] = ()
 
     @property
@@ -90,48 +105,104 @@ def validate(
     Raises:
         ValueError: a flight cannot be read, none has a window in the air, or rates or rotors differ.
     """
-    recordings, skipped = read_flights(paths, mapping, report)
-    interval = recordings[0].interval
-    used, starts, unused = [], [], []
-    for recording in recordings:
-        result = window_starts(recording, horizons[-1], stride)
-        if len(result):
-            used.append(recording)
-            starts.append(result)
+    flights, skipped = read_flights(paths, mapping, report)
+    missing = unmeasured_motion(flights)
+    flights = [with_made_up_motion(flight, missing) for flight in flights]
+    recordings, unused = with_windows(flights, horizons[-1], stride)
+    plant = plant_of(scene, recordings, overrides)
+    recordings = [recording.in_volts(plant.full_voltage) for recording in recordings]
+    name = Path(str(getattr(scene, "name", scene))).stem
+    memory = trim_memory(memory, missing)
+    validation = compare_with_flights(name, plant, recordings, horizons, memory, stride, report, unmeasured=missing)
+    loops, unflown = [], []
+    for k, recording in enumerate(recordings if closed_loop else []):
+        report(f"closed loop: {recording.name}", k, len(recordings))
+        loop = None if "position" in missing else fly_setpoints(scene, recording, overrides)
+        if loop is None:
+            lacking = "position" if "position" in missing else "setpoints in the air"
+            unflown.append(f"{recording.name}: no {lacking} to fly in closed loop")
         else:
-            unused.append(without_window(recording))
-    if not used:
-        raise ValueError(f"{unused[0]}; {USABLE}")
-    skipped += unused
-    plant = PlantRows(scene, interval, overrides)
-    for recording in used:
+            loops.append(loop)
+    return replace(validation, skipped=(*skipped, *unused, *unflown), closed_loop=tuple(loops))
+
+
+def compare_with_flights(
+    name: str,
+    plant: PlantRows,
+    recordings: list[Recording],
+    horizons: tuple[int, ...],
+    memory: TrimMemory,
+    stride: int,
+    report: Callable[[str, int, int], None] = lambda text, done, total: None,
+    others: Sequence[Recording] = (),
+    unmeasured: tuple[str, ...] = (),
+) -> Validation:
+    """Compare the predictions of a plant's first parameter set with flights that have windows.
+
+    Args:
+        name: name of the scene.
+        plant: plant at the interval of the recordings.
+        recordings: flights.
+        horizons: see `validate`, likewise `memory`, `stride` and `report`.
+        others: further flights to which the linear baseline is fitted.
+        unmeasured: fields that are not compared, since the flights have made-up values of them.
+    """
+    every = [*recordings, *others]
+    starts = [window_starts(r, horizons[-1], stride) for r in every]
+    report("start states", 0, len(recordings))
+    flights = []
+    for k, (recording, state) in enumerate(zip(recordings, start_states(plant, recordings, memory), strict=True)):
+        report(recording.name, k, len(recordings))
+        predicted = predict(plant, recording, starts[k], state, horizons)
+        errors = compare(recording, starts[k], horizons, predicted)
+        ratio = thrust_ratio(recording, starts[k], state, "velocity" not in unmeasured)
+        flights.append(FlightErrors(recording, starts[k], errors, state, ratio))
+    report("baselines", len(recordings), len(recordings))
+    constant = [constant_velocity(f.recording, f.starts, horizons) for f in flights]
+    baselines = {"constant_velocity": constant, "linear_fit": linear_fit(every, starts, horizons)[: len(flights)]}
+    cluster = clusters([f.starts for f in flights], plant.interval)
+    own = _all_magnitudes([f.plant for f in flights])
+    own[..., [FIELDS.index(field) for field in unmeasured]] = np.nan
+    theirs = {key: _all_magnitudes(errors) for key, errors in baselines.items()}
+    return Validation(
+        name, plant.interval, horizons, memory, tuple(flights), (), int(cluster.max()) + 1, pool(own, cluster),
+        {key: pool(values, cluster) for key, values in theirs.items()},
+        {key: ratios(own, values, cluster) for key, values in theirs.items()},
+        _noise_errors(plant, flights, horizons, memory), missing=tuple(unmeasured),
+    )  # fmt: skip
+
+
+def _noise_errors(
+    plant: PlantRows, flights: Sequence[FlightErrors], horizons: tuple[int, ...], memory: TrimMemory
+) -> np.ndarray:
+    """Return the mean errors that noise alone causes, shape (horizons, fields). See `measurement_noise`."""
+    changes = []
+    noisy = [noisier(f.recording, k) for k, f in enumerate(flights)]
+    for flight, recording, state in zip(flights, noisy, start_states(plant, noisy, memory), strict=True):
+        starts = flight.starts[::THINNED]
+        errors = compare(recording, starts, horizons, predict(plant, recording, starts, state, horizons))
+        changes.append(Errors(*(a - b[::THINNED] for a, b in zip(errors, flight.plant, strict=True))))
+    values = _all_magnitudes(changes)
+    return np.array([[m.mean for m in row] for row in pool(values, np.zeros(len(values), int))])
+
+
+def _all_magnitudes(errors: Sequence[Errors]) -> np.ndarray:
+    return np.concatenate([magnitudes(e) for e in errors])
+
+
+def plant_of(scene: Scene | str | Path, recordings: Sequence[Recording], overrides: Overrides = ()) -> PlantRows:
+    """Return the scene's plant at the interval of the recordings.
+
+    Raises:
+        ValueError: a recording has another number of motors.
+    """
+    plant = PlantRows(scene, recordings[0].interval, overrides)
+    for recording in recordings:
         if recording.rotors != plant.rotors:
             raise ValueError(
                 f"{recording.name}: {recording.rotors} motors, the scene has {plant.rotors}; use the vehicle's scene"
             )
-    report("start states", 0, len(used))
-    states = start_states(plant, used, memory)
-    flights = []
-    for k, (recording, s, state) in enumerate(zip(used, starts, states, strict=True)):
-        report(recording.name, k, len(used))
-        errors = compare(recording, s, horizons, predict(plant, recording, s, state, horizons))
-        flights.append(FlightErrors(recording, s, errors, state, thrust_ratio(recording, s, state)))
-    report("baselines", len(used), len(used))
-    constant = [constant_velocity(r, s, horizons) for r, s in zip(used, starts, strict=True)]
-    baselines = {"constant_velocity": constant, "linear_fit": linear_fit(used, starts, horizons)}
-    loops = []
-    for k, recording in enumerate(used if closed_loop else []):
-        report(f"closed loop: {recording.name}", k, len(used))
-        loop = fly_setpoints(scene, recording, overrides)
-        if loop is None:
-            skipped.append(f"{recording.name}: no setpoints in the air to fly in closed loop")
-        else:
-            loops.append(loop)
-    return Validation(
-        str(Path(str(getattr(scene, "name", scene))).stem), interval, horizons, memory, tuple(flights), tuple(skipped),
-        pool_flights([magnitudes(f.plant) for f in flights]),
-        {name: pool_flights([magnitudes(e) for e in errors]) for name, errors in baselines.items()}, tuple(loops),
-    )  # fmt: skip
+    return plant
 
 
 def read_flights(
@@ -145,61 +216,28 @@ def read_flights(
         ValueError: a flight cannot be read, or its rate differs from the first one's.
     """
     recordings: list[Recording] = []
-    repeated = []
+    skipped = []
     for k, path in enumerate(paths):
         report(f"reading {path.name}", k, len(paths))
         recording = open_flight(path, mapping)
         if original := next((other.name for other in recordings if recording.repeats(other)), None):
-            repeated.append(f"{recording.name}: the same flight as {original}")
+            skipped.append(f"{recording.name}: the same flight as {original}")
             continue
         recordings.append(recording)
         if abs(recording.interval - recordings[0].interval) > 1e-6:
             rates = f"{1.0 / recording.interval:g} Hz, others {1.0 / recordings[0].interval:g} Hz"
             raise ValueError(f"{path}: sampled at {rates}; validate them separately")
-    return recordings, repeated
+    return recordings, skipped
 
 
-def write_json(path: Path, validation: Validation) -> None:
-    """Write errors, confidence intervals and baselines by horizon."""
-    rows = []
-    for k, steps in enumerate(validation.horizons):
-        row: dict = {"steps": steps, "time": steps * validation.interval, "windows": validation.windows}
-        row |= _values(validation.plant[k])
-        row["confidence_95"] = {name: [m.low, m.high] for name, m in zip(FIELDS, validation.plant[k], strict=True)}
-        row["baselines"] = {name: _values(rows_of[k]) for name, rows_of in validation.baselines.items()}
-        rows.append(row)
-    flights = {f.recording.name: _flight(validation, f) for f in validation.flights}
-    content = {
-        "scene": validation.scene,
-        "trim": validation.memory,
-        "horizons": rows,
-        "flights": flights,
-        "skipped": validation.skipped,
-        "warnings": validation.warnings,
-    }
-    if validation.closed_loop:
-        content["closed_loop"] = [
-            {
-                "flight": c.name,
-                "seconds": c.time[-1],
-                "difference": c.difference,
-                "tracking_error": {name: c.tracking_error(getattr(c, name)) for name in ("simulated", "recorded")},
-            }
-            for c in validation.closed_loop
-        ]
-    json_file.write_json(path, content)
+def with_windows(recordings: list[Recording], longest: int, stride: int = STRIDE) -> tuple[list[Recording], list[str]]:
+    """Return the flights with windows of `longest` samples in the air, and a line for each other flight.
 
-
-def _flight(validation: Validation, flight: FlightErrors) -> dict:
-    means = _values(pool_flights([magnitudes(flight.plant)[:, -1:]])[0])
-    return {
-        "windows": len(flight.starts),
-        **means,
-        "thrust_ratio": flight.thrust_ratio,
-        "faults": flight.recording.faults,
-        "notes": flight.recording.notes,
-    }
-
-
-def _values(metrics: list[Metric]) -> dict[str, float]:
-    return {name: m.mean for name, m in zip(FIELDS, metrics, strict=True)}
+    Raises:
+        ValueError: there is no such flight.
+    """
+    flies = [len(window_starts(r, longest, stride)) > 0 for r in recordings]
+    unused = [without_window(r) for r, flying in zip(recordings, flies, strict=True) if not flying]
+    if not any(flies):
+        raise ValueError(f"{unused[0]}; {USABLE}")
+    return list(compress(recordings, flies)), unused

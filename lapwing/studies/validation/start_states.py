@@ -5,8 +5,8 @@ from typing import NamedTuple
 import numpy as np
 from scipy.signal import lfilter
 
-from lapwing.studies.flight_import.recording import Recording
-from lapwing.studies.rotation_arrays import conjugate, rotate
+from lapwing.flights.log_import.recording import Recording
+from lapwing.flights.rotation_arrays import conjugate, rotate
 from lapwing.studies.validation.plant_rows import MOTION, PlantRows
 
 PIECE = 400  # samples per piece of a flight; pieces are stepped in parallel

@@ -6,16 +6,14 @@ from typing import NamedTuple
 
 import numpy as np
 
-from lapwing.dynamics.environment import STANDARD_GRAVITY
-from lapwing.studies.flight_import.recording import LOWEST, Recording
-from lapwing.studies.rotation_arrays import conjugate, product, rotate, rotation_vector
+from lapwing.flights.log_import.recording import LOWEST, Recording
+from lapwing.flights.rotation_arrays import conjugate, product, rotation_vector, specific_force
 from lapwing.studies.validation.plant_rows import MOTION, PlantRows
 from lapwing.studies.validation.start_states import StartStates
 
 PAST = 20  # number of samples before a window that must be valid, for rotor speeds and trim
 POWER, WIDTH = MOTION + 3, MOTION + 4  # column of the power, and number of columns, of a prediction
 BATCH = 16_384  # windows per batch
-UPWARD = np.array([0.0, 0.0, STANDARD_GRAVITY])  # [m/s^2] world, specific force at rest
 
 
 class Errors(NamedTuple):
@@ -40,20 +38,22 @@ def window_starts(flight: Recording, longest: int, stride: int) -> np.ndarray:
 
 def without_window(flight: Recording) -> str:
     """Return the message on a flight in which `window_starts` finds no window."""
-    return f"{flight.name}: {' and '.join(flight.obstacles) or 'no valid window in the air'}"
+    reasons = [f"no {', '.join(flight.missing)}"] if flight.missing else []
+    reasons += [flight.obstacle] if flight.obstacle else []
+    return f"{flight.name}: {' and '.join(reasons) or 'no valid window in the air'}"
 
 
-def thrust_ratio(flight: Recording, starts: np.ndarray, states: StartStates) -> float:
+def thrust_ratio(flight: Recording, starts: np.ndarray, states: StartStates, by_velocity: bool) -> float:
     """Return the ratio of predicted to measured specific force along body z, of their medians over the windows.
 
-    Both follow from the change of velocity over the first sample of each window, so the ratio needs no accelerometer.
-    It is 1 for the scene's own vehicle, and thrust over mass of the scene over that of any other vehicle in hover. NaN
-    if the measured force is not positive.
+    Both follow from the change of velocity over the first sample of each window, so the ratio needs no accelerometer,
+    unless `by_velocity` is False. It is 1 for the scene's own vehicle, and thrust over mass of the scene over that of
+    any other vehicle in hover. NaN if the measured force is not positive.
     """
     acceleration = (flight.velocity[starts + 1] - flight.velocity[starts]) / flight.interval
-    measured = rotate(conjugate(flight.attitude[starts]), acceleration + UPWARD)[:, 2]
+    measured = specific_force(flight.attitude[starts], acceleration)[:, 2]
     predicted = measured - states.residual[0, starts, 2]
-    force = float(np.median(measured))
+    force = float(np.median(measured if by_velocity else flight.specific_force[starts, 2]))
     return float(np.median(predicted)) / force if force > 0.0 else np.nan
 
 
@@ -135,7 +135,7 @@ def compare(flight: Recording, starts: np.ndarray, horizons: tuple[int, ...], pr
     """Return predicted minus measured values."""
     at = starts[:, None] + np.array(horizons)
     attitude = product(conjugate(flight.attitude[at]), predicted[..., 3:7])
-    middle = rotate(conjugate(predicted[..., 3:7]), predicted[..., 13:16] + UPWARD)
+    middle = specific_force(predicted[..., 3:7], predicted[..., 13:16])
     force = 0.5 * (flight.specific_force[at] + flight.specific_force[at - 1])
     return Errors(
         predicted[..., :3] - flight.position[at],

@@ -5,7 +5,7 @@ from lapwing.dynamics.vector import Vec3
 from lapwing.kernels import math
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.guidance import Guidance
-from lapwing.services.autopilot.land_detector import CUT_HEIGHT
+from lapwing.services.autopilot.land_detector import TAKEOFF_HEIGHT
 from lapwing.services.common.ports import Setpoint
 
 _RISING = 0.01  # [m/s]
@@ -61,7 +61,7 @@ class AttitudeFlight:
         s, c = math.sincos(self.yaw)
         forward, left = g * self.pitch, -g * self.roll
         if thrust > constants.hover_thrust or climb_rate > 0.0:  # makes a vehicle on the ground take off
-            z, vz = max(z, constants.resting_height + CUT_HEIGHT), max(vz, _RISING)
+            z, vz = max(z, constants.resting_height + TAKEOFF_HEIGHT), max(vz, _RISING)
         if math.isnan(thrust):
             self._altitude = max(self._altitude, constants.resting_height) + view.dt * climb_rate
             z, vz, up = self._altitude, climb_rate, 0.0

@@ -80,11 +80,12 @@ def disarm(context: Context, command: Any) -> None:
     state = context.state
     if not state.guidance.armed:
         return
-    if state.guidance.flying and value(command.values, 0) != 1.0:
+    in_flight = state.guidance.flying
+    if in_flight and value(command.values, 0) != 1.0:
         raise ValueError("Disarming denied: not landed")  # the words of PX4
     if state.on_trajectory:
         transitions.enter(context.constants, state, "hold")
-    transitions.disarm(context, status_texts.AS_COMMANDED)
+    transitions.disarm(context, status_texts.STOPPED if in_flight else status_texts.AS_COMMANDED)
 
 
 @handles(*MODES)
@@ -168,7 +169,7 @@ def parameter(context: Context, command: Any) -> None:
 @handles("finish")
 def finish(context: Context, command: Any) -> None:
     """End the run once the vehicle has flown and is disarmed."""
-    context.state.finish_requested = True
+    context.state.guidance.finish_requested = True
 
 
 def call_or_deny(function: Callable, argument: Any) -> Any:

@@ -3,9 +3,8 @@
 It is deterministic: its output depends on its inputs only, and time-outs use simulation time.
 """
 
-import math
-
-from lapwing.dynamics.vector import ZERO
+from lapwing.dynamics.vector import ZERO, norm, subtract
+from lapwing.kernels import math
 from lapwing.messages import CommandAck
 from lapwing.services.autopilot.commander import failsafes, failure_handlers, plan_handlers, prearm_checks  # noqa: F401 (two declare their handlers)
 from lapwing.services.autopilot.commander.command_handlers import handle
@@ -13,14 +12,19 @@ from lapwing.services.autopilot.commander.commander_input import CommanderInput,
 from lapwing.services.autopilot.commander.commander_output import CommanderOutput, OperatorMessages, Status
 from lapwing.services.autopilot.commander.commander_state import State, initial
 from lapwing.services.autopilot.commander.route import ACTIVE, COMPLETE, NO_MISSION, NOT_STARTED, PAUSED
+from lapwing.services.autopilot.commander.smoothing import PositionSmoothing
 from lapwing.services.autopilot.commander.transitions import Context, arm, disarm, enter
 from lapwing.services.autopilot.commander.wakeup_conditions import battery_thresholds, time_without_changes
 from lapwing.services.common import status_texts
 from lapwing.services.common.ports import Setpoint, StateEstimate
 
-BLOCKED_TIME = 1.0  # [s] without descent at a descending setpoint, after which the vehicle is on the ground
+STOPPED_TIME = 1.0  # [s] at rest with low direct motor voltages, after which the vehicle is on the ground
 LOW_THRUST = 0.5  # fraction of the hover thrust below which the vehicle cannot fly
 LANDED_SPEED = 0.15  # [m/s]
+LYING, LYING_TIME = 0.5, 2.0  # cosine of a tilt that no mode but the free ones commands; [s] until the motors stop
+HELD_DISTANCE, HELD_SPEED, HELD_TIME = 5.0, 0.3, 10.0  # [m] from the setpoint, [m/s], [s]: an obstacle holds it
+HELD_MODES = ("mission", "goto", "orbit", "return", "land", "takeoff", "hold")
+FREE_MODES = ("acro", "stabilized", "offboard")  # with tilts of a pilot or a computer
 
 
 class Commander:
@@ -108,8 +112,11 @@ def _setpoint(context: Context) -> tuple[Setpoint | None, bool]:
         guidance.has_flown = True
     elif guidance.flying:
         failsafes.update(context)
+        _detect_crash(context)
+        _detect_obstruction(context)
     if guidance.flying:
         _detect_landing(context)
+    _end_fall(context)
     _disarm_when_idle(context)
     mode = state.mode
     assert mode is not None
@@ -125,14 +132,49 @@ def _setpoint(context: Context) -> tuple[Setpoint | None, bool]:
 
 
 def _detect_landing(context: Context) -> None:
-    """Detect the ground: motors cut by the controller, or no descent at low thrust."""
+    """Follow the land detector. It does not see direct motor voltages: with them, detect rest at low thrust."""
     view, state, guidance = context.view, context.state, context.state.guidance
+    direct = state.mode is not None and state.mode.motor_voltage is not None
     still = abs(view.estimate.velocity_world[2]) < LANDED_SPEED
-    blocked = guidance.smoothing.velocity[2] < -0.2 and still and view.thrust < LOW_THRUST
-    state.blocked_time = state.blocked_time + view.dt if blocked else 0.0
-    if view.motors_cut or state.blocked_time > BLOCKED_TIME:
-        guidance.flying, state.on_ground_time, state.blocked_time = False, 0.0, 0.0
+    stopped = direct and guidance.smoothing.velocity[2] < -0.2 and still and view.thrust < LOW_THRUST
+    state.stopped_time = state.stopped_time + view.dt if stopped else 0.0
+    if view.motors_cut or state.stopped_time > STOPPED_TIME:
+        guidance.flying, state.on_ground_time, state.stopped_time = False, 0.0, 0.0
         context.outbox.send_text(status_texts.LANDED)
+
+
+def _detect_crash(context: Context) -> None:
+    """Stop the motors of a vehicle that lies on its side or back: nothing else would end its flight."""
+    view, state = context.view, context.state
+    q = view.estimate.attitude
+    lies = 1.0 - 2.0 * (q.x * q.x + q.y * q.y) < LYING and state.mode_name not in FREE_MODES
+    state.lying_time = state.lying_time + view.dt if lies else 0.0
+    if state.lying_time > LYING_TIME:
+        disarm(context, status_texts.TURNED_OVER)
+
+
+def _detect_obstruction(context: Context) -> None:
+    """Land where a vehicle stands still far from its setpoint: something holds it, and the plan cannot be flown."""
+    view, state, guidance = context.view, context.state, context.state.guidance
+    x, y, _ = subtract(guidance.smoothing.position, view.estimate.position_world)
+    vx, vy, _ = view.estimate.velocity_world
+    far = math.hypot(x, y) > HELD_DISTANCE and state.mode_name in HELD_MODES and not view.position_lost
+    state.held_time = state.held_time + view.dt if far and math.hypot(vx, vy) < HELD_SPEED else 0.0
+    if state.held_time > HELD_TIME:
+        state.held_time, yaw = 0.0, guidance.smoothing.yaw
+        guidance.smoothing = PositionSmoothing(view.estimate.position_world, yaw)
+        failsafes.take_over(context, status_texts.HELD, "land")
+
+
+def _end_fall(context: Context) -> None:
+    """Wait until a vehicle whose motors were stopped in flight is at rest."""
+    view, state = context.view, context.state
+    if state.fall_time < math.inf:
+        state.fall_time -= view.dt
+        still = norm(view.estimate.velocity_world) < LANDED_SPEED
+        state.stopped_time = state.stopped_time + view.dt if still else 0.0
+        if state.stopped_time > STOPPED_TIME or state.fall_time < 0.0:
+            state.fall_time, state.stopped_time = math.inf, 0.0
 
 
 def _disarm_when_idle(context: Context) -> None:
@@ -170,12 +212,16 @@ def status(constants: Constants, view: CommanderInput, state: State) -> Status:
     guidance, route = state.guidance, state.guidance.route
     armed = guidance.armed and not state.on_trajectory
     blockers = prearm_checks.arming_blockers(view, state) if constants.has_operator and not armed else ()
-    last_flight = not constants.has_operator or state.finish_requested
+    last_flight = not constants.has_operator or guidance.finish_requested
     return Status(
         mode=state.mode_name,
         phase=state.mode.phase if state.mode else "",
         armed=armed,
-        finished=not state.on_trajectory and guidance.has_flown and not armed and last_flight,
+        finished=not state.on_trajectory
+        and guidance.has_flown
+        and not armed
+        and last_flight
+        and state.fall_time == math.inf,
         failsafe=state.failsafe,
         mission_current=min(route.current, max(0, len(route.items) - 1)),
         mission_count=len(route.items),

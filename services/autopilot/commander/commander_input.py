@@ -23,6 +23,7 @@ class Constants(NamedTuple):
     rotors: int = 4
     imus: int = 1
     has_gps: bool = True
+    height_known: bool = False  # the height above the ground is measured
 
 
 class CommanderInput(NamedTuple):

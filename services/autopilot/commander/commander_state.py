@@ -1,5 +1,6 @@
 """State of the commander: plain data that can be copied or pickled."""
 
+import math
 from dataclasses import dataclass, field
 from typing import Any, NamedTuple
 
@@ -36,15 +37,17 @@ class State:
     guidance: Guidance
     mode_name: str
     mode: FlightMode | None  # None: the scene's trajectory
-    failsafe: str = ""  # reason of the active failsafe
+    failsafe: str = ""  # reason of the active failsafe, or of the stop of the motors in flight
     failsafe_timers: dict[str, FailsafeTimer] = field(default_factory=dict)  # active conditions by reason
     source_outage: list[float] = field(default_factory=lambda: [0.0] * len(SOURCES))  # [s] of lost or rejected sources
     faults: Faults = field(default_factory=Faults)  # injected
     pending_arm: PendingArm | None = None
     on_ground_time: float = 0.0  # [s] armed on the ground
-    blocked_time: float = 0.0  # [s] without descent at a descending setpoint
+    stopped_time: float = 0.0  # [s] at rest with low direct motor voltages, or after a fall
+    lying_time: float = 0.0  # [s] on the side or back with motors
+    held_time: float = 0.0  # [s] at rest far from the setpoint
+    fall_time: float = math.inf  # [s] left for the fall after the motors stopped in flight; infinity without
     imu_selection: ImuSelection = field(default_factory=ImuSelection)  # last one announced
-    finish_requested: bool = False  # the next disarming ends the run
 
     @property
     def on_trajectory(self) -> bool:

@@ -112,10 +112,15 @@ def _act(context: Context, reason: str, mode: str | None) -> bool:
         mode = "altitude_control"  # a pilot holds the sticks
     elif _severity(state) >= _SEVERITY.index(mode):
         return False
-    state.failsafe = reason
-    enter(context.constants, state, mode)
-    context.outbox.send_text(status_texts.TAKEN_OVER.format(reason, mode))
+    take_over(context, reason, mode)
     return True
+
+
+def take_over(context: Context, reason: str, mode: str) -> None:
+    """Enter the mode of a failsafe, and tell the operator why."""
+    context.state.failsafe = reason
+    enter(context.constants, context.state, mode)
+    context.outbox.send_text(status_texts.TAKEN_OVER.format(reason, mode))
 
 
 def _severity(state: State) -> int:

@@ -4,7 +4,7 @@ import heapq
 from collections.abc import Iterator, Sequence
 
 from lapwing.kernels import math
-from lapwing.services.autopilot.commander.fence import Fence
+from lapwing.services.common.plans.fence import Fence
 
 MARGIN = 2.0  # [m] clearance from the fence
 CIRCLE_CORNERS = 12  # vertices of the polygon around a circle

@@ -3,12 +3,12 @@
 from dataclasses import dataclass, field
 
 from lapwing.dynamics.lie.quaternion import to_roll_pitch_yaw
-from lapwing.dynamics.vector import Vec3
+from lapwing.dynamics.vector import Vec3, subtract
 from lapwing.kernels import math
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
-from lapwing.services.autopilot.commander.fence import Fence
 from lapwing.services.autopilot.commander.route import Route
 from lapwing.services.autopilot.commander.smoothing import Limits, PositionSmoothing
+from lapwing.services.common.plans.fence import Fence
 from lapwing.services.common.ports import Setpoint
 
 STICK_DEADZONE = 0.05
@@ -49,6 +49,7 @@ class Guidance:
     home: Vec3 = (0.0, 0.0, 0.0)  # [m] world x, y and ground height, of the arming position or set by command
     roi: Vec3 | None = None  # [m] region of interest, towards which the vehicle yaws
     released: bool = False  # open the gripper
+    finish_requested: bool = False  # the next disarming ends the run: no operator waits
     route: Route = field(default_factory=Route)
     fence: Fence = field(default_factory=Fence)
     rally_points: tuple[Vec3, ...] = ()
@@ -87,6 +88,13 @@ class Guidance:
         """Return world z [m] of an altitude parameter above home."""
         return self.home[2] + constants.resting_height + self.parameters[parameter]
 
+    def words(self, constants: Constants, position: Vec3) -> str:
+        """Return a position from home in words: "10 m north, 5 m up"."""
+        east, north, up = subtract(position, (*self.home[:2], self.home[2] + constants.resting_height))
+        named = ((north, "north", "south"), (east, "east", "west"), (up, "up", "down"))
+        parts = [f"{abs(way):.3g} m {there if way > 0.0 else back}" for way, there, back in named if abs(way) >= 0.05]
+        return ", ".join(parts) or "home"
+
     @property
     def home_distances(self) -> tuple[float, float]:
         """Maximum horizontal and vertical distance from home [m]; 0: unlimited."""
@@ -101,6 +109,11 @@ class Guidance:
         if 0.0 < vertical <= z - constants.resting_height - self.home[2]:
             return False
         return self.fence.allows(x, y)
+
+    @property
+    def first_place_limit(self) -> float:
+        """Maximum distance of a mission's first position from the start [m]; 0 or less: unlimited."""
+        return self.parameters.get("MIS_DIST_1WP", 0.0)  # not in logs of former versions
 
     @property
     def offboard_available(self) -> bool:

@@ -5,18 +5,22 @@ from typing import Any
 
 from lapwing.services.autopilot.commander import transitions
 from lapwing.services.autopilot.commander.command_handlers import Denied, call_or_deny, handles
-from lapwing.services.autopilot.commander.fence import Fence, rally_points
 from lapwing.services.autopilot.commander.flight_mode import fill_in, value, vector
 from lapwing.services.autopilot.commander.guidance import GRIPPER
 from lapwing.services.autopilot.commander.route import GRAB, Route
 from lapwing.services.autopilot.commander.transitions import Context
+from lapwing.services.common.plans.fence import Fence, rally_points
+from lapwing.services.common.plans.route_checks import check_first_place
 
 
 @handles("mission_upload")
 def mission_upload(context: Context, command: Any) -> None:
     """Replace the mission."""
-    state = context.state
-    state.guidance.route = call_or_deny(Route, command.items)
+    state, guidance = context.state, context.state.guidance
+    start = guidance.home if guidance.armed else context.view.estimate.position_world
+    route = call_or_deny(Route, command.items)
+    call_or_deny(lambda items: check_first_place(items, start[:2], guidance.first_place_limit), command.items)
+    guidance.route = route
     if state.mode_name == "mission" and not state.on_trajectory:
         continues = state.guidance.route.items and state.guidance.flying
         transitions.enter(context.constants, state, "mission" if continues else "hold")

@@ -9,6 +9,8 @@ from lapwing.services.autopilot.commander.commander_state import State
 from lapwing.services.autopilot.commander.mode_table import MODES
 from lapwing.services.common import status_texts
 
+LONGEST_FALL = 30.0  # [s] after the motors stopped in flight: the estimate of a crashed vehicle may not come to rest
+
 
 class Context(NamedTuple):
     """Data of one tick for command handlers and failsafes."""
@@ -38,6 +40,7 @@ def arm(context: Context) -> None:
     """Arm and set home."""
     guidance = context.state.guidance
     guidance.armed, guidance.has_flown, context.state.on_ground_time = True, False, 0.0
+    context.state.failsafe, context.state.fall_time = "", math.inf
     if not guidance.sticks_fresh:
         guidance.inputs.sticks_age = math.inf  # lost at arming: optional until they return, as in PX4
     x, y, z = context.view.estimate.position_world
@@ -46,10 +49,12 @@ def arm(context: Context) -> None:
 
 
 def disarm(context: Context, reason: str) -> None:
-    """Disarm and reset the flight's settings."""
+    """Disarm and reset the flight's settings. In flight, the reason stays the status' failsafe until the next one."""
     state = context.state
+    in_flight = state.guidance.flying
+    state.failsafe, state.fall_time = (reason, LONGEST_FALL) if in_flight else ("", math.inf)
     state.guidance.armed = state.guidance.flying = False
-    state.failsafe, state.guidance.speed, state.guidance.roi = "", math.nan, None
+    state.guidance.speed, state.guidance.roi = math.nan, None
     state.failsafe_timers.clear()
     if state.mode_name != "hold":
         enter(context.constants, state, "hold")

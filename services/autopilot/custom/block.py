@@ -12,15 +12,14 @@ from lapwing.kernels import always_inline, python_function
 from lapwing.kernels.cell import read
 from lapwing.kernels.codegen import generic
 from lapwing.services.autopilot import motor_failure
-from lapwing.services.autopilot.block import Controller, block_outputs, start_step
+from lapwing.services.autopilot.block import Controller, block_outputs, motors_off, start_step
 from lapwing.services.autopilot.custom.controller_output import (
     NO_WRENCH,
     ControllerOutput,
     command,
-    motors_off,
+    no_output,
     parse_controller_output,
 )
-from lapwing.services.autopilot.land_detector import FLYING, INITIAL_LANDED_STATE, LandedState, update_landed_state
 from lapwing.services.autopilot.mixer import zero_thrust
 from lapwing.services.common.ports import PerRotor
 
@@ -46,7 +45,6 @@ class CustomController(NamedTuple):
 class CustomState(NamedTuple):
     """State of the block."""
 
-    landed_state: LandedState
     own: Any
     held: ControllerOutput  # last output of the user's controller
     failure_detector: motor_failure.State
@@ -57,8 +55,8 @@ class CustomState(NamedTuple):
 def start(p: CustomController) -> CustomState:
     """Return the initial state."""
     parameters = read(p.common.failure_detector)
-    held, detector = motors_off(len(parameters.roll_arm)), python_function(motor_failure.start)(parameters)
-    return CustomState(INITIAL_LANDED_STATE, p.own_start, held, detector, 0, float("nan"))
+    held, detector = no_output(len(parameters.roll)), python_function(motor_failure.start)(parameters)
+    return CustomState(p.own_start, held, detector, 0, float("nan"))
 
 
 @always_inline
@@ -93,16 +91,15 @@ def step(
     """Compute the motor command at `tick`."""
     c = p.common
     i = start_step(c, s, tick, inputs)
-    e, setpoint = i.estimate, i.setpoint
-    landed = INITIAL_LANDED_STATE if i.restarts else s.landed_state
-    landed = update_landed_state(landed, c.law.value.resting_height, e, setpoint, c.interval)
-    own, held, no_voltage = s.own, s.held, zero_thrust(c.law.value.shares[0])
-    if landed.name != FLYING:
+    e, setpoint, law = i.estimate, i.setpoint, c.law.value
+    own, held, no_voltage = s.own, s.held, zero_thrust(law.shares[0])
+    if not i.flying:
         own, held = p.own_start, ControllerOutput(True, no_voltage, NO_WRENCH, (0.0, 0.0))
     elif tick % p.every == 0:
         own, held = _call_user_step(p.own, own, tick * c.interval, e, setpoint, inputs[4:], no_voltage)
-    motor_command = command(
-        c.law.value, p.lift, p.moments, p.voltage_max, held, setpoint.yaw, landed.name, i.failure_detector.failed
-    )
-    detector, outputs = block_outputs(c, i, landed.name, motor_command)
-    return CustomState(landed, own, held, detector, i.still_from, i.charge), outputs, CONTINUE
+    motor_command = motors_off(law, setpoint)
+    if i.flying:
+        failed = i.failure_detector.failed
+        motor_command = command(law, p.lift, p.moments, p.voltage_max, held, setpoint.yaw, failed)
+    detector, outputs = block_outputs(c, i, motor_command)
+    return CustomState(own, held, detector, i.still_from, i.charge), outputs, CONTINUE

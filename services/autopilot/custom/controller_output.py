@@ -11,15 +11,7 @@ from lapwing.kernels import always_inline
 from lapwing.kernels.codegen import compile_source, overload_for
 from lapwing.services.autopilot import control
 from lapwing.services.autopilot.control import Command
-from lapwing.services.autopilot.land_detector import FLYING, LANDED
-from lapwing.services.autopilot.mixer import (
-    VirtualControls,
-    active_allocation,
-    clamp_to_range,
-    mix,
-    saturate,
-    zero_thrust,
-)
+from lapwing.services.autopilot.mixer import VirtualControls, active_allocation, clamp_to_range, mix, saturate
 from lapwing.services.autopilot.motor import thrusts_at, voltages
 from lapwing.services.common.controller_api import MotorVoltages, ThrustAndMoments
 from lapwing.services.common.ports import PerRotor
@@ -39,7 +31,7 @@ class ControllerOutput(NamedTuple):
     roll_pitch: tuple[float, float]  # [rad] references, for the log
 
 
-def motors_off(rotors: int) -> ControllerOutput:
+def no_output(rotors: int) -> ControllerOutput:
     """Return the output that stops the motors."""
     return ControllerOutput(True, (0.0,) * rotors, NO_WRENCH, (0.0, 0.0))
 
@@ -100,10 +92,9 @@ def command(
     voltage_max: float,
     requested: ControllerOutput,
     yaw: float,
-    landed: int,
     failed: int,
 ) -> Command:
-    """Return the motor command.
+    """Return the motor command in flight.
 
     Args:
         law: controller parameters with control allocation and motor model.
@@ -112,12 +103,8 @@ def command(
         voltage_max: [V].
         requested: output of the user's controller.
         yaw: setpoint [rad].
-        landed: ON_GROUND, FLYING or LANDED.
         failed: number of the failed rotor, from 1; 0: none.
     """
-    if landed != FLYING:
-        zero = zero_thrust(law.shares[0])
-        return Command(zero, zero, 0.0, 0.0, yaw, landed == LANDED)
     if requested.to_motors:
         volts = clamp_to_range(requested.volts, voltage_max)
         thrust = thrusts_at(law.motor, volts)
@@ -128,4 +115,4 @@ def command(
         saturated = saturate(shares, desired, law.thrust_max, law.airmode)
         thrust = clamp_to_range(mix(shares, saturated), law.thrust_max)
         volts = voltages(law.motor, thrust)
-    return Command(volts, thrust, requested.roll_pitch[0], requested.roll_pitch[1], yaw, False)
+    return Command(volts, thrust, requested.roll_pitch[0], requested.roll_pitch[1], yaw)

@@ -15,9 +15,9 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.kernels.cell import Cell
 from lapwing.services.autopilot.controller_parameters import Airframe
 from lapwing.services.autopilot.custom.controller_output import parse_controller_output
+from lapwing.services.autopilot.custom.estimator_api import validate_estimate
 from lapwing.services.autopilot.motor import thrust_at
 from lapwing.services.common.controller_api import MotorVoltages, ThrustAndMoments, VehicleModel
-from lapwing.services.common.estimator_api import validate_estimate
 from lapwing.services.common.ports import Setpoint, StateEstimate
 from lapwing.services.common.user_code import load_object
 

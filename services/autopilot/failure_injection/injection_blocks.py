@@ -32,13 +32,13 @@ _UNITS: dict[str, tuple[str, ...]] = {  # units of each sensor port; redundant I
 class Injection:
     """Failure injection of a run; inactive without a cell of `Faults`."""
 
-    def __init__(self, faults: Cell | None, setup: RunConfig, read: Collection[str], motor: Motor):
+    def __init__(self, faults: Cell | None, config: RunConfig, read: Collection[str], motor: Motor):
         """Create the injection; `read` has the names of the sensor ports that the autopilot reads."""
         self.faults, self._motor = faults, motor
-        rotors = len(setup.port(ports.ACTUATORS).like.motor_voltage)
+        rotors = len(config.port(ports.ACTUATORS).example.motor_voltage)
         self.released = DirectMotorControl(False, (0.0,) * rotors)  # the controller's command reaches the motors
         self.direct = None if faults is None else Cell(self.released)
-        self._setup, self._ports = setup, setup.ports
+        self._config, self._ports = config, config.ports
         self._sensors = [name for name in _UNITS if name in read] if faults is not None else []
 
     @property
@@ -62,10 +62,10 @@ class Injection:
         blocks = []
         for port in self._sensors:
             sensor_port = self._ports[port]
-            memory = Cell(Memory(sensor_port.like, 0))
+            memory = Cell(Memory(sensor_port.example, 0))
             received_port = sensor_port._replace(name=self.received(port))
-            key = stream_key(self._setup.seed, self._setup.vehicle, f"failure.{port}")
-            late = sensor_port.period * max(1, round(DELAY / self._setup.interval / sensor_port.period))
+            key = stream_key(self._config.seed, self._config.vehicle, f"failure.{port}")
+            late = sensor_port.period * max(1, round(DELAY / self._config.interval / sensor_port.period))
             inputs = InputPort(port), InputPort(port, late)
             parameters: Any = SensorInjection(self.faults, key)
             if port in ports.IMUS:
@@ -76,7 +76,7 @@ class Injection:
         if self.faults is not None:
             sensor_port = self._ports[ports.BATTERY]
             received_port = sensor_port._replace(name=self.received(ports.BATTERY))
-            battery, memory = BatteryInjection(self.faults), Cell(sensor_port.like)
+            battery, memory = BatteryInjection(self.faults), Cell(sensor_port.example)
             reads = (InputPort(ports.BATTERY),)
             blocks.append(Block(f"{name}.inject.battery", battery, memory, reads, (received_port,), sensor_port.period))
         return blocks
@@ -86,6 +86,6 @@ class Injection:
         if self.faults is None:
             return []
         inputs = (InputPort(self.commanded(actuators).name),)
-        memory = Cell(Memory(actuators.like.motor_voltage, 0))
+        memory = Cell(Memory(actuators.example.motor_voltage, 0))
         parameters = MotorInjection(self.faults, self.direct, self._motor)
         return [Block(f"{name}.inject.motors", parameters, memory, inputs, (actuators,))]

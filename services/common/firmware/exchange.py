@@ -1,21 +1,24 @@
 """Compiled exchange with a firmware: memory that it shares with Python, and the command that it publishes.
 
-The parameters of an adapter's exchange are a NamedTuple in whose module `step` sends the samples of a tick and receives
-the firmware's outputs. It calls Python (`call_python`) only if the outputs are late or unexpected, and to poll
-the firmware's MAVLink link.
+The parameters of an adapter's exchange are a NamedTuple with the `Shared` memory. Its module has `exchange(parameters,
+tick)`, which sends the samples of a tick and receives the firmware's outputs. Python is called (`call_python`) only if
+the outputs are late or unexpected, and to poll the firmware's MAVLink link.
 """
 
 import ctypes
+import sys
 import time
+from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
+from numba import types
 
-from lapwing.cosim.diagram.compiled_block import InputRing, ring_index
+from lapwing.cosim.diagram.compiled_block import CONTINUE, NON_FINITE, InputRing, ring_index
 from lapwing.cosim.diagram.tick_schedule import LATCHED
 from lapwing.dynamics.vector import ZERO
 from lapwing.kernels import always_inline
-from lapwing.kernels.codegen import map_tuple
+from lapwing.kernels.codegen import generic, map_tuple
 from lapwing.kernels.native_calls import address_of, call_int, call_long
 from lapwing.kernels.row_packing import load, pack_row, store
 from lapwing.services.common.firmware.hold import FirmwareCommand
@@ -23,6 +26,7 @@ from lapwing.services.common.ports import PerRotor
 
 OPEN, WAIT, SEND, POLL, INVALID = range(5)
 """Reasons to call Python: first exchange; missing or unexpected answer; sending failed; poll due; samples invalid."""
+FAILED = -1  # result of an exchange that ends the run; others: 1 if the outputs prove that the vehicle is armed, else 0
 ARMED, LANDED, FINISHED, STATUS_TEXT = range(4)  # `flags`
 WAITING, FIRST_START, LAST_START, LAST_END = range(4)  # `seconds`
 
@@ -47,32 +51,32 @@ class Shared(NamedTuple):
     python: int  # `python(tick, reason, number) -> 0 to continue`
 
 
-def shared_memory(setup: Any, command: np.ndarray, outputs: int, python: Any) -> Shared:
+def shared_memory(config: Any, command: np.ndarray, outputs: int, python: Any) -> Shared:
     """Return the memory of an exchange.
 
     Args:
-        setup: `FirmwareSetup` of the adapter.
+        config: `FirmwareConfig` of the adapter.
         command: row of the port `hold.COMMAND`.
         outputs: number of outputs of the firmware.
         python: ctypes function that compiled code calls.
     """
     clock = np.zeros(2, np.int64)
     return Shared(
-        setup.period, setup.interval, setup.order, (0.0,) * len(setup.order), command, np.zeros(outputs),
+        config.period, config.interval, config.order, (0.0,) * len(config.order), command, np.zeros(outputs),
         np.array([0, 1, 0, 0]), np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros(4), clock, clock.ctypes.data,
         time.CLOCK_MONOTONIC, address_of(ctypes.CDLL(None).clock_gettime), address_of(python),
     )  # fmt: skip
 
 
-def empty_ring(like: Any) -> InputRing:
+def empty_ring(example: Any) -> InputRing:
     """Return the ring of a port that the vehicle does not have."""
-    return InputRing(like, pack_row(like)[None], LATCHED, 0)
+    return InputRing(example, pack_row(example)[None], LATCHED, 0)
 
 
 @always_inline
 def newest(ring: InputRing, tick: int) -> Any:
     """Return the newest sample up to `tick`."""
-    return load(ring.like, ring.rows, ring_index(tick, ring.period, ring.rows))
+    return load(ring.example, ring.rows, ring_index(tick, ring.period, ring.rows))
 
 
 @always_inline
@@ -89,7 +93,7 @@ def call_python(e: Shared, tick: int, reason: int, number: int) -> bool:
 
 
 @always_inline
-def begin(e: Shared, tick: int) -> bool:
+def _begin(e: Shared, tick: int) -> bool:
     """Count an exchange and store its wall time. Return False without a connection."""
     if e.steps[0] == 0:
         if not call_python(e, tick, OPEN, 0):
@@ -101,8 +105,8 @@ def begin(e: Shared, tick: int) -> bool:
 
 
 @always_inline
-def end(e: Shared, tick: int) -> bool:
-    """Add the wall time since `begin` to the waiting time, and poll the other link if it is due.
+def _end(e: Shared, tick: int) -> bool:
+    """Add the wall time since `_begin` to the waiting time, and poll the other link if it is due.
 
     Return False if the run ends.
     """
@@ -119,8 +123,28 @@ def _duty(outputs_armed: tuple[Any, bool], output: int, _: float) -> float:
 
 
 @always_inline
-def publish(e: Shared, running: bool) -> None:
+def _publish(e: Shared, running: bool) -> None:
     """Write the command. `running`: the outputs prove that the vehicle is armed."""
     armed, landed = e.flags[ARMED] != 0 or running, e.flags[LANDED] != 0 and not running
     duty = map_tuple(_duty, (e.outputs, armed), e.order, e.none)
     store(FirmwareCommand(duty, armed, landed, e.flags[FINISHED] != 0, e.flags[STATUS_TEXT], ZERO), e.command, 0)
+
+
+@generic(inline=True)
+def _exchange(p: types.Type, tick: types.Type) -> Callable:
+    return sys.modules[p.instance_class.__module__].exchange  # type: ignore[no-any-return]
+
+
+@always_inline
+def step(p: Any, s: int, tick: int, inputs: tuple) -> tuple[int, tuple, int]:
+    """Send the samples at `tick`, receive the outputs, and write the command."""
+    e = p.shared
+    if tick % e.period != 0:
+        return s, (), CONTINUE
+    running = FAILED
+    if _begin(e, tick):
+        running = _exchange(p, tick)
+    if running == FAILED or not _end(e, tick):
+        return s, (), NON_FINITE
+    _publish(e, running != 0)
+    return s, (), CONTINUE

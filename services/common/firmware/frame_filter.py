@@ -6,10 +6,8 @@ A firmware sends hundreds of messages a second; decoding all took three times as
 from collections.abc import Collection
 
 V1, V2 = 0xFE, 0xFD
-_SIGNED, _SIGNATURE, _CHECKSUM = 0x01, 13, 2  # flag; [bytes]
-
-
 MOST = 256  # message ids in `dropped`
+_SIGNED, _SIGNATURE, _CHECKSUM = 0x01, 13, 2  # incompatibility flag; [bytes]
 
 
 class FrameFilter:
@@ -29,19 +27,18 @@ class FrameFilter:
         data, result = self._rest + data, []
         at, end = 0, len(data)
         while at < end:
-            magic = data[at]
-            if magic not in (V1, V2):
+            if data[at] not in (V1, V2):
                 at += 1
                 continue
-            head = 10 if magic == V2 else 6
+            head, id_at, id_size = (10, 7, 3) if data[at] == V2 else (6, 5, 1)
             if at + head > end:
                 break
             length = head + data[at + 1] + _CHECKSUM
-            if magic == V2 and data[at + 2] & _SIGNED:
+            if data[at] == V2 and data[at + 2] & _SIGNED:
                 length += _SIGNATURE
             if at + length > end:
                 break
-            number = data[at + 7] | data[at + 8] << 8 | data[at + 9] << 16 if magic == V2 else data[at + 5]
+            number = int.from_bytes(data[at + id_at : at + id_at + id_size], "little")
             if number in self._numbers:
                 result.append(data[at : at + length])
             elif len(self.dropped) < MOST:

@@ -1,12 +1,12 @@
 """Compiled block: holds a firmware's last outputs between exchanges, as motor voltages and status at every tick."""
 
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.vector import ZERO, Vec3
 from lapwing.kernels import always_inline
-from lapwing.kernels.codegen import map_tuple
-from lapwing.services.common.ports import AutopilotStatus, MotorCommand, PerRotor
+from lapwing.kernels.codegen import map_tuple, reduce_tuple
+from lapwing.services.common.ports import AutopilotStatus, MotorCommand, PerRotor, Setpoint
 
 COMMAND = "firmware"  # port of `FirmwareCommand`
 
@@ -23,7 +23,7 @@ class FirmwareCommand(NamedTuple):
 
 
 class Hold(NamedTuple):
-    """Parameters of the block; its inputs are command and battery."""
+    """Parameters of the block; its inputs are command, battery, and the trajectory if the firmware follows it."""
 
     voltage_max: float  # [V] of the supply before the first reading of the battery
     none: PerRotor  # zero for each rotor
@@ -41,12 +41,24 @@ def _volts(supply: float, duty: float, _: float) -> float:
 
 
 @always_inline
+def _reference(_: int, sample: InputSample, __: InputSample) -> Any:
+    return sample.value
+
+
+@always_inline
+def _phase(_: int, phase: int, reference: Setpoint, __: Setpoint) -> int:
+    return reference.phase
+
+
+@always_inline
 def step(p: Hold, s: HeldState, tick: int, inputs: tuple[InputSample, ...]) -> tuple[HeldState, tuple, int]:
-    """Return the motor command and the status at `tick`."""
+    """Return the motor command, the status, and the reference of the trajectory at `tick`."""
     command, battery = inputs[0].value, inputs[1]
+    references = map_tuple(_reference, 0, inputs[2:], inputs[2:])
     supply = battery.value.voltage if battery.due else s.supply
     motors = MotorCommand(
         map_tuple(_volts, supply, command.duty, p.none), command.armed, p.none, command.attitude_reference
     )
-    status = AutopilotStatus(0, command.status_text_id, command.armed, command.landed, command.finished)
-    return HeldState(supply), (motors, status), CONTINUE
+    phase = reduce_tuple(_phase, 0, 0, references, references)
+    status = AutopilotStatus(phase, command.status_text_id, command.armed, command.landed, command.finished)
+    return HeldState(supply), (motors, status, *references), CONTINUE

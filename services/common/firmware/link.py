@@ -1,18 +1,31 @@
-"""Interface between the adapter of a firmware and the block that steps it."""
+"""Link to a firmware: its program, its instance, time-outs, and the report of the link."""
 
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
-from typing import Any, NamedTuple, Protocol
+import socket
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any, NamedTuple, NoReturn
 
-from lapwing.cosim.run_errors import LockStepError
-from lapwing.services.common.firmware.setup import FirmwareSetup
+from lapwing.cosim.processes.patience import Patience
+from lapwing.cosim.processes.shared_core import process_tree
+from lapwing.services.common.firmware.firmware_config import FirmwareConfig
+from lapwing.services.common.firmware.program import (
+    QUOTE,
+    FirmwareError,
+    OwnPort,
+    PortInUseError,
+    Program,
+    bound_socket,
+    owner_of_port,
+)
+from lapwing.services.common.firmware.repeatable import ELSEWHERE, OFF, Repeatable, Turns, library
+
+LOADED = 5.0  # [s] from the start to the library's report
+STARTS = 5  # most starts of a program whose ports are in use
 
 Read = Callable[[str], Any]  # newest sample of a port
 Waits = Callable[[str], None]  # called at least every 0.2 s with the reason of a wait; raises to end the run
-
-
-class FirmwareError(LockStepError):
-    """Error of a firmware that stalls or violates its protocol; the text has its name, the time and a remedy."""
 
 
 class FirmwareOutput(NamedTuple):
@@ -45,19 +58,18 @@ class LinkReport:
     wall: float = 0.0  # [s] of wall time from the first exchange to the last
     cpu: float = 0.0  # [s] of CPU time of the firmware in flight, 0 if Lapwing has not started it
     own_cpu: float = 0.0  # [s] of CPU time of this process in the same time
-    jitter: float = 0.0  # [s] standard deviation of the wall time between exchanges (real time only)
-    reproducible: bool = True  # False: no lock step, so two runs differ
+    unrepeatable: str = ""  # why two flights differ, "" if they do not
     notes: list[str] = field(default_factory=list)  # warnings for the user, each once
-
-    @property
-    def fields(self) -> dict[str, Any]:
-        """All counts as plain data."""
-        return asdict(self)
 
     def note(self, text: str) -> None:
         """Add a warning, each text once."""
         if text not in self.notes:
             self.notes.append(text)
+
+    def reject(self, text: str) -> None:
+        """Count a rejected packet, and add its warning."""
+        self.rejected += 1
+        self.note(text)
 
     def __str__(self) -> str:
         """Return the counts in one line."""
@@ -67,63 +79,180 @@ class LinkReport:
         parts.append(f"waiting {share:.0f} %")
         if self.cpu > 0.0:
             parts.append(f"CPU {self.own_cpu:.3g} s of Lapwing and {self.cpu:.3g} s of the firmware")
-        if not self.reproducible:
-            parts.append(f"jitter {1e3 * self.jitter:.2f} ms, not reproducible")
+        if self.unrepeatable:
+            parts.append(f"not repeatable: {self.unrepeatable}")
         return f"{' '.join(filter(None, (self.firmware, self.version)))}: {', '.join(parts)}"
 
 
-class Link(Protocol):
-    """Connection to one running firmware. See the package for the order of the calls."""
+class ProgramLink:
+    """Connection to one running firmware, whose program it starts unless the user does.
 
-    report: LinkReport
+    Attributes:
+        report: counts of the link.
+        log: log of the run, beside which output and logs of the program are kept; None if the run has none.
+    """
 
-    def __init__(self, setup: FirmwareSetup) -> None:
+    INSTANCES = 1  # instances with separate ports
+    OWN_PORTS: tuple[OwnPort, ...] = ()  # which the program opens
+    OWN_LOGS = ""  # pattern of the program's logs in its working directory
+    ADVICE = "stop the other program that uses it, or set autopilot.instance"
+
+    log: Path | None = None
+    _claim: Callable[[], None]  # open the ports of Lapwing for the instance; PortInUseError if one is in use
+    _begin: Callable[[], None]  # start the program or wait for it, and connect
+    _waits: Waits
+    _program: Program | None = None
+    _time = 0.0  # [s] simulation time
+    _flying = False
+    _reason = ELSEWHERE  # why two flights differ, of a program without the library
+    in_turns = False  # the firmware answers each message once all of its threads wait
+    _known_peer: tuple[tuple[int, int] | None, int | None] = (None, None)  # end of the link, and its process
+
+    def __init__(self, config: FirmwareConfig) -> None:
         """Store the configuration; open nothing."""
+        self._config, self.report = config, LinkReport(config.firmware)
 
     def open(self, waits: Waits) -> None:
-        """Start the firmware or wait for it, and connect."""
+        """Start the firmware or wait for it, and connect.
+
+        A program that Lapwing starts gets the first instance whose ports are free: runs side by side, as in a campaign,
+        get different ones.
+
+        Raises:
+            FirmwareError: it does not start, or no instance is free.
+        """
+        config, starts, self._waits = self._config, 0, waits
+        first = config.instance or 0
+        for instance in range(first, max(self.INSTANCES, first + 1)):
+            self._config = config._replace(instance=instance)
+            try:
+                self._claim()
+                self._check_own_ports()
+                self._begin()
+            except FirmwareError as error:
+                quote = self._program.quote() if self._program and QUOTE not in str(error) else ""
+                starts += self._program is not None
+                self.close()
+                last = not config.chooses or instance + 1 >= self.INSTANCES or starts >= STARTS
+                if last or not isinstance(error, PortInUseError):
+                    raise type(error)(f"{error}{quote}") from None
+                continue
+            self._flying = True
+            return
+
+    def close(self) -> None:
+        """End the program, then free the ports: another run may use the instance at once."""
+        self._reason = self.unrepeatable
+        if self._program:
+            self._program.close()
+        self._program = None
+
+    def _check_own_ports(self) -> None:
+        """Raise PortInUseError if a port that the program will open is in use."""
+        if self._config.command:
+            for port in self.OWN_PORTS:
+                self._bound(port.kind, port.default + port.stride * (self._config.instance or 0)).close()
+
+    def _bound(self, kind: int, port: int) -> socket.socket:
+        return bound_socket(self._config.firmware, kind, self._config.host, port, self.ADVICE)
+
+    def _start(
+        self,
+        arguments: Sequence[str] = (),
+        files: Any = None,
+        variables: dict[str, str] | None = None,
+        turns: Turns | None = None,
+    ) -> None:
+        """Start the program; those of the scene take precedence over environment `variables`. See `Program`."""
+        config = self._config._replace(environment={**(variables or {}), **self._config.environment})
+        prepared = self._prepare(turns) if turns else None
+        self._program = Program(config, arguments, files, self.log, self.OWN_LOGS, prepared)
+
+    def _prepare(self, turns: Turns) -> Repeatable | None:
+        """Return the library that makes the program repeatable, None if there is none, for a reason that is stored."""
+        try:
+            path = library() if self._config.repeatable else None
+        except OSError as error:
+            self._reason = str(error)
+            return None
+        self._reason = "" if path else OFF
+        return Repeatable(path, turns, self._config.schedule) if path else None
+
+    def _take_turns(self, event: str) -> None:
+        """Wait until the library reports an event; without it, the firmware does not run in turns."""
+        repeatable = self._program.repeatable if self._program else None
+        loaded, started = self._patience(LOADED), self._patience(self._config.start_timeout)
+        self.in_turns = False
+        while repeatable and not self.in_turns:
+            if (started if repeatable.attached and event == "ready" else loaded).over:
+                return
+            self._waits(self._config.firmware)
+            repeatable.read()
+            self._check_program()
+            self.in_turns = getattr(repeatable, event)
+            time.sleep(0.0 if self.in_turns else 0.01)
+
+    @property
+    def unrepeatable(self) -> str:
+        """Reason why two flights differ, "" if they do not."""
+        repeatable = self._program.repeatable if self._program else None
+        return repeatable.problem if repeatable else self._reason
 
     @property
     def pid(self) -> int | None:
-        """Process id of the firmware, None if this link has not started it."""
+        """Process id of the program, None if Lapwing has not started it."""
+        return self._program.pid if self._program else None
+
+    @property
+    def output(self) -> str:
+        """Name of the file beside the log of the run that has the program's output, "" without one."""
+        return self._program.output.name if self._program and self.log else ""
 
     def cpu(self) -> float:
-        """Return the CPU time [s] that the firmware has used, 0 if this link has not started it."""
+        """Return the CPU time [s] of the program, 0 if Lapwing has not started it."""
+        return self._program.cpu() if self._program else 0.0
 
-    def close(self) -> None:
-        """Close the connection, and end the program if this link has started it."""
+    def _peer(self) -> tuple[int, int] | None:
+        """Return kind and port of the firmware's end of the link, None without a connection."""
+        return None
 
+    def _patience(self, timeout: float) -> Patience:
+        """Return a time-out that does not pass while the firmware is stopped, also one that the user has started."""
+        if self._program:
+            return Patience(timeout, *process_tree(self._program.pid), pauses=True)
+        peer = self._peer()
+        if peer != self._known_peer[0]:
+            self._known_peer = peer, owner_of_port(*peer) if peer else None
+        return Patience(timeout, self._known_peer[1], pauses=True)
 
-class FirmwareLink(Link, Protocol):
-    """Link that Python code steps."""
+    def _attempts(self, reason: str, timeout: float) -> Iterator[None]:
+        """Yield before each attempt, which may take 0.2 s, and once more after `timeout` [s].
 
-    def step(self, tick: int, read: Read, waits: Waits) -> FirmwareOutput:
-        """Send the samples at `tick`, and return the firmware's outputs."""
-
-
-class ExchangeLink(Link, Protocol):
-    """Link with which compiled code exchanges samples and outputs (`exchange`)."""
-
-    outputs: int  # number of outputs
-
-    def exchange(self, shared: Any, ring: Callable[[str], Any]) -> Any:
-        """Return the parameters of the compiled exchange.
-
-        Args:
-            shared: `exchange.Shared` memory.
-            ring: returns the `InputRing` of a port.
+        Raises:
+            FirmwareError: the program has ended.
         """
+        patience, over = None, False
+        while not over:
+            over = patience is not None and patience.over
+            self._waits(reason)
+            self._check_program()
+            yield
+            patience = patience or self._patience(timeout)
 
-    def handle_call(self, tick: int, reason: int, number: int, read: Read, waits: Waits) -> FirmwareOutput | None:
-        """Handle a call from compiled code at `tick`: wait for outputs, send again, or poll the MAVLink link.
+    @property
+    def _when(self) -> str:
+        return f" at t = {self._time:.3f} s" if self._flying else " at its start"
 
-        Args:
-            tick: tick of the exchange.
-            reason: WAIT, SEND, POLL or INVALID of `exchange`.
-            number: for WAIT, size [bytes] of the datagram that compiled code received.
-            read: returns the newest sample of a port.
-            waits: see `Waits`.
+    def _check_program(self) -> None:
+        if self._program:
+            self._program.check(self._when, not self._flying)
+            if self._program.repeatable and self._program.repeatable.stuck:
+                self._fail(self._program.repeatable.stuck, f"set {OFF}")
 
-        Returns:
-            The state of the vehicle without outputs after a poll, otherwise None.
-        """
+    def _time_out(self, problem: str, advice: str) -> NoReturn:
+        """Raise FirmwareError, which also names the key of the time-out."""
+        self._fail(problem, f"{advice}, or raise autopilot.{'step' if self._flying else 'start'}_timeout")
+
+    def _fail(self, problem: str, advice: str) -> NoReturn:
+        quote = self._program.quote() if self._program else ""
+        raise FirmwareError(f"{self._config.firmware}: {problem}{self._when}; {advice}{quote}")

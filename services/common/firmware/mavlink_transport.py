@@ -3,41 +3,18 @@
 import contextlib
 import socket
 import time
-from typing import Protocol
 
 PIECE = 65536  # [bytes] most that one call reads
 CONNECT_TIMEOUT, ATTEMPT_EVERY = 0.2, 0.5  # [s] duration of one attempt, and between two
 
 
-class Transport(Protocol):
-    """Connection to the MAVLink link of a firmware."""
-
-    where: str  # address, for messages
-
-    def receive(self) -> bytes:
-        """Return the bytes that have arrived since the last call."""
-
-    def send(self, data: bytes) -> None:
-        """Send bytes; they are lost while there is no connection."""
-
-    def close(self) -> None:
-        """Close the connection."""
-
-
 class UdpTransport:
     """Socket on the port to which the firmware sends; answers go to the address of the last datagram."""
 
-    def __init__(self, host: str, port: int):
-        """Open the socket. Raise OSError if the port is in use."""
-        self.where = f"udp {host}:{port}"
-        self._socket = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
-        try:
-            self._socket.bind((host, port))
-        except OSError:
-            self._socket.close()
-            raise
+    def __init__(self, bound: socket.socket):
+        """Use a bound socket."""
+        self._socket, self._peer = bound, None
         self._socket.setblocking(False)
-        self._peer: tuple[str, int] | None = None
 
     def receive(self) -> bytes:
         """Return the bytes that have arrived since the last call."""
@@ -64,32 +41,28 @@ class TcpTransport:
 
     def __init__(self, host: str, port: int):
         """Store the address; `receive` connects."""
-        self.where = f"tcp {host}:{port}"
         self._address = (host, port)
         self._socket: socket.socket | None = None
         self._next = 0.0  # [s] wall time of the next attempt
 
     def receive(self) -> bytes:
         """Return the bytes that have arrived since the last call; connect first if there is no connection."""
-        if self._socket is None:
-            if time.monotonic() < self._next:
-                return b""
-            self._next = time.monotonic() + ATTEMPT_EVERY
-            try:
-                self._socket = socket.create_connection(self._address, timeout=CONNECT_TIMEOUT)
-            except OSError:
-                return b""
-            self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
-            self._socket.setblocking(False)
         result = b""
         try:
+            if self._socket is None:
+                if time.monotonic() < self._next:
+                    return b""
+                self._next = time.monotonic() + ATTEMPT_EVERY
+                self._socket = socket.create_connection(self._address, timeout=CONNECT_TIMEOUT)
+                self._socket.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+                self._socket.setblocking(False)
             while part := self._socket.recv(PIECE):
                 result += part
         except BlockingIOError:
             return result
         except OSError:
             pass
-        self.close()  # the end of the stream
+        self.close()  # no connection, or the end of the stream
         return result
 
     def send(self, data: bytes) -> None:
@@ -105,3 +78,6 @@ class TcpTransport:
         if self._socket is not None:
             self._socket.close()
             self._socket = None
+
+
+Transport = UdpTransport | TcpTransport

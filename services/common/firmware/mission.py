@@ -1,4 +1,4 @@
-"""Mission of a scene for a firmware, from a file; `mission_messages` converts it."""
+"""Mission of a scene for a firmware, from a file."""
 
 from pathlib import Path
 from typing import Any, ClassVar
@@ -7,9 +7,7 @@ from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.scene import Files, Scene, SceneTable
 from lapwing.cosim.scene.files import unvalidated_value
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.services.common.environment_schema import environment
-from lapwing.services.common.flight_plan_file import parse
-from lapwing.services.common.vehicle_schema import start_height
+from lapwing.services.common.plans.plan_file import parse, site_of
 
 
 class MissionKeys(SceneTable):
@@ -37,7 +35,10 @@ def with_mission(scene: Scene, table: type[MissionKeys], config: ServiceConfig) 
         return config
     keys = scene[table]
     try:
-        commands = parse(Path(keys.mission or ""), keys.mission_text, start_height(scene), environment(scene).home)
+        commands = parse(Path(keys.mission or ""), keys.mission_text, site_of(scene, firmware=True)).commands
     except ValueError as error:
         raise ConfigError(f"{table.TABLE}.mission", str(error)) from None
-    return config._replace(parameters=config.parameters._replace(plan=tuple(commands)))
+    if any(command.items for command in commands if command.kind in ("fence_upload", "rally_upload")):
+        message = f"{keys.mission}: geofence and rally points are not uploaded to a firmware"
+        raise ConfigError(f"{table.TABLE}.mission", message, "a plan without them")
+    return config._replace(parameters=config.parameters._replace(plan=commands))

@@ -6,22 +6,23 @@ speed of the run. Source: MAVLink guide, "Mission Protocol", "Parameter Protocol
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from enum import Enum, auto
+from enum import Enum
+from types import MappingProxyType
 from typing import Any, NamedTuple
 
 from lapwing.services.common.firmware.frame_filter import FrameFilter
-from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput
+from lapwing.services.common.firmware.link import FirmwareOutput, LinkReport
 from lapwing.services.common.firmware.mavlink_transport import Transport
-from lapwing.services.common.firmware.mission_messages import item_message, result_name
-from lapwing.services.common.firmware.parameter_client import ParameterClient
+from lapwing.services.common.firmware.parameter_client import RETRY, ParameterClient
+from lapwing.services.common.firmware.program import FirmwareError
 from lapwing.services.common.firmware.status_texts import StatusTexts
 from lapwing.services.common.mavlink.dialect import id_of, mavlink
 from lapwing.services.common.mavlink.frames import saturate
 
 SYSTEM, COMPONENT = 245, mavlink.MAV_COMP_ID_MISSIONPLANNER  # ids of this client
-RETRY = 1.0  # [s] until an unanswered message is sent again
 POLL_EVERY = 0.1  # [s] between two polls
 ROUND_OFF = 1e-6  # [s] by which a poll may be early
+STATE_EVERY = 200_000.0  # [us] between two EXTENDED_SYS_STATE
 REJECTIONS = 20  # rejected uploads, one per second, after which the flight fails
 CELLS_UNKNOWN, TEMPERATURE_UNKNOWN = 65535, 32767  # in BATTERY_STATUS
 STOPS = 4  # most messages that one poll asks the firmware to stop
@@ -36,17 +37,11 @@ class Conventions(NamedTuple):
     bytewise: bool  # integer parameters keep their bytes in the float field
     mode_name: Callable[[int], str]  # name of a heartbeat's custom_mode
     event_text: Callable[[int, bytes], str] = lambda number, arguments: ""  # text of a failsafe's EVENT, "" for others
+    parameters: Mapping[str, float] = MappingProxyType({})  # that a mission needs
 
 
-class Stage(Enum):
-    """Progress of the client."""
-
-    CONNECTING = auto()
-    PARAMETERS = auto()
-    UPLOADING = auto()
-    ARMING = auto()
-    FLYING = auto()
-    FINISHED = auto()
+Stage = Enum("Stage", ["CONNECTING", "PARAMETERS", "UPLOADING", "ARMING", "FLYING", "FINISHED"])
+"""Progress of the client."""
 
 
 class MissionClient:
@@ -61,11 +56,16 @@ class MissionClient:
         error: reason why the flight is impossible, "" as long as it is possible.
         version: version of the firmware, "" until it reports it.
         next_poll: simulation time [s] of the next poll.
-        reached: number of the last item that the vehicle has reached, -1: none.
     """
 
     def __init__(
-        self, transport: Transport, conventions: Conventions, items: Sequence[Any], parameters: Mapping[str, float]
+        self,
+        transport: Transport,
+        conventions: Conventions,
+        items: Sequence[Any],
+        parameters: Mapping[str, float],
+        sets: bool = True,
+        optional: Mapping[str, float] = MappingProxyType({}),
     ):
         """Create the client.
 
@@ -73,10 +73,12 @@ class MissionClient:
             transport: link to the firmware.
             conventions: conventions of the firmware.
             items: MISSION_ITEM_INT messages; empty: only monitor the flight.
-            parameters: firmware parameters to set before the upload.
+            parameters: firmware parameters.
+            sets: True to set the parameters before the upload, False to compare them: the firmware got them at start.
+            optional: further firmware parameters, of which a version may lack some.
         """
         self._transport, self._conventions, self._items = transport, conventions, list(items)
-        self._initial_parameters = dict(parameters)
+        self._initial = {**optional, **parameters}, conventions.bytewise, sets, optional.keys() - parameters.keys()
         self._codec = mavlink.MAVLink(None, srcSystem=SYSTEM, srcComponent=COMPONENT)
         self._codec.robust_parsing = True
         self._filter = FrameFilter(NEEDED)
@@ -86,7 +88,7 @@ class MissionClient:
 
     def _reset(self) -> None:
         """Reset to the state before the first heartbeat."""
-        self._parameters = ParameterClient(self._initial_parameters, self._conventions.bytewise)
+        self._parameters = ParameterClient(*self._initial)
         self._target = 0  # system id of the firmware
         self._stopped = set[int]()  # ids of messages that the firmware was asked to stop
         self._sent = -1.0  # [s] of the last request
@@ -95,7 +97,6 @@ class MissionClient:
         self.stage = Stage.CONNECTING
         self.armed, self.landed, self.mode, self.error = False, True, "", ""
         self.texts = StatusTexts()
-        self.reached = -1
 
     def restart(self) -> None:
         """Start over after a restart of the firmware, which has lost its state; discard its earlier messages."""
@@ -114,9 +115,19 @@ class MissionClient:
             self._send(
                 mavlink.MAVLink_heartbeat_message(mavlink.MAV_TYPE_GCS, mavlink.MAV_AUTOPILOT_INVALID, 0, 0, 4, 3)
             )
+        if self.connected:
+            for message in self._parameters.requests(self._target, time):
+                self._send(message)
+            if self.stage is Stage.PARAMETERS and self._parameters.done:
+                self._advance(Stage.UPLOADING if self._items else Stage.FLYING)
         if time >= self._sent + RETRY or self._sent < 0.0:
             self._sent = time
             self._request()
+
+    @property
+    def parameter_problems(self) -> list[str]:
+        """A text for each parameter that the firmware did not take."""
+        return self._parameters.problems
 
     def next_poll_tick(self, interval: float) -> int:
         """Return the tick of the next poll; `interval`: [s] of a tick."""
@@ -125,7 +136,9 @@ class MissionClient:
     def read(self) -> None:
         """Connect if there is no connection, and process the received messages."""
         for message in self._codec.parse_buffer(self._filter.select(self._transport.receive())) or ():
-            self._handle(message)
+            handler = getattr(self, f"_on_{message.get_type().lower()}", None)
+            if handler is not None and message.get_srcComponent() == mavlink.MAV_COMP_ID_AUTOPILOT1:
+                handler(message)
 
     def _stop_others(self) -> None:
         """Ask the firmware, once for each, to stop messages that have no handler.
@@ -133,7 +146,7 @@ class MissionClient:
         PX4 sends 400 of them per second on its onboard link, which only this client receives. Sending and receiving
         them took a tenth of the CPU time of PX4 and a third of that of Lapwing.
         """
-        if self._target:
+        if self.connected:
             for number in sorted(self._filter.dropped - self._stopped)[:STOPS]:
                 self._stopped.add(number)
                 self._command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, number, -1.0)
@@ -150,7 +163,7 @@ class MissionClient:
 
     def send_battery(self, voltage: float, current: float, charge: float) -> None:
         """Send the state of the battery [V], [A], fraction, as a battery of the same vehicle does."""
-        if not self._target:
+        if not self.connected:
             return
         cells = [saturate(1e3 * voltage, 16, True), *(CELLS_UNKNOWN,) * 9]
         percent = min(max(round(100.0 * charge), 0), 100)
@@ -159,10 +172,6 @@ class MissionClient:
         )
         codec = mavlink.MAVLink(None, srcSystem=self._target, srcComponent=mavlink.MAV_COMP_ID_BATTERY)
         self._transport.send(message.pack(codec))
-
-    def close(self) -> None:
-        """Close the link."""
-        self._transport.close()
 
     def _send(self, message: Any) -> None:
         self._transport.send(message.pack(self._codec))
@@ -173,38 +182,26 @@ class MissionClient:
 
     def _request(self) -> None:
         """Send the next request of the stage."""
-        if self.stage is Stage.PARAMETERS:
-            if message := self._parameters.request(self._target):
-                self._send(message)
-            else:
-                self._advance(Stage.UPLOADING if self._items else Stage.FLYING)
-        elif self.stage is Stage.UPLOADING:
+        if self.stage is Stage.UPLOADING:
             count = len(self._items) + self._conventions.home_first
             self._send(mavlink.MAVLink_mission_count_message(self._target, 1, count))
+        elif self.stage is Stage.ARMING and self._in_mode:
+            self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         elif self.stage is Stage.ARMING:
-            if not self._in_mode:
-                main, sub = self._conventions.mission_mode
-                flag = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
-                self._command(mavlink.MAV_CMD_DO_SET_MODE, flag, main, sub)
-            else:
-                self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
+            flag = mavlink.MAV_MODE_FLAG_CUSTOM_MODE_ENABLED
+            self._command(mavlink.MAV_CMD_DO_SET_MODE, flag, *self._conventions.mission_mode)
 
     def _command(self, command: int, *parameters: float) -> None:
         padded = (*parameters, *(0.0,) * (7 - len(parameters)))
         self._send(mavlink.MAVLink_command_long_message(self._target, 1, command, 0, *padded))
-
-    def _handle(self, message: Any) -> None:
-        handler = getattr(self, f"_on_{message.get_type().lower()}", None)
-        if handler is not None and message.get_srcComponent() == mavlink.MAV_COMP_ID_AUTOPILOT1:
-            handler(message)
 
     def _on_heartbeat(self, message: Any) -> None:
         if message.autopilot == mavlink.MAV_AUTOPILOT_INVALID:
             return
         if self.stage is Stage.CONNECTING:
             self._target = message.get_srcSystem()
-            every = 200_000.0  # [us]
-            self._command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE, every)
+            state = mavlink.MAVLINK_MSG_ID_EXTENDED_SYS_STATE
+            self._command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, state, STATE_EVERY)
             self._command(mavlink.MAV_CMD_REQUEST_MESSAGE, mavlink.MAVLINK_MSG_ID_AUTOPILOT_VERSION)
             self._advance(Stage.PARAMETERS)
         was_armed, self.armed = self.armed, bool(message.base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED)
@@ -223,14 +220,25 @@ class MissionClient:
         self.landed = message.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND
 
     def _on_param_value(self, message: Any) -> None:
-        if self._parameters.receive(message):
-            self._sent = -1.0
+        self._parameters.receive(message)
 
     def _on_mission_request(self, message: Any) -> None:
         number = message.seq - self._conventions.home_first
         if self.stage is not Stage.UPLOADING or not -1 <= number < len(self._items):
             return
-        self._send(item_message(self._items, number, self._target, message.seq, self._conventions.open_value))
+        frame, command = mavlink.MAV_FRAME_GLOBAL_RELATIVE_ALT_INT, mavlink.MAV_CMD_NAV_WAYPOINT
+        values: tuple[float, ...] = (0.0,) * 4  # item -1: the home position, which the firmware knows
+        place: tuple[Any, ...] = (0, 0, 0.0)
+        if number >= 0:
+            item, replacement = self._items[number], self._conventions.open_value
+            frame, command, place = item.frame, item.command, (item.x, item.y, item.z)
+            values = (item.param1, item.param2, item.param3, item.param4)
+            values = tuple(replacement if math.isnan(value) else value for value in values)
+        self._send(
+            mavlink.MAVLink_mission_item_int_message(
+                self._target, 1, message.seq, frame, command, 0, 1, *values, *place
+            )
+        )
 
     _on_mission_request_int = _on_mission_request
 
@@ -242,10 +250,9 @@ class MissionClient:
             return
         self._rejections += 1  # ArduPilot has no space for a mission until it has started
         if self._rejections > REJECTIONS:
-            self.error = f"the mission is rejected ({result_name(message.type)}) {self.texts.error}".rstrip()
-
-    def _on_mission_item_reached(self, message: Any) -> None:
-        self.reached = message.seq - self._conventions.home_first
+            entry = mavlink.enums["MAV_MISSION_RESULT"].get(message.type)
+            name = entry.name.lower() if entry else message.type
+            self.error = f"the mission is rejected ({name}) {self.texts.error}".rstrip()
 
     def _on_command_ack(self, message: Any) -> None:
         if self.stage is not Stage.ARMING:
@@ -259,7 +266,7 @@ class MissionClient:
     def _on_event(self, message: Any) -> None:
         text = self._conventions.event_text(message.id, bytes(message.arguments))
         if self.armed and text:
-            self.texts.add_event(text)
+            self.texts.failsafe, self.texts.has_event = text, True
 
     def _on_statustext(self, message: Any) -> None:
         text = message.text.rstrip("\0").strip()  # PX4 ends texts that it also sends as events with a tab
@@ -270,17 +277,20 @@ NEEDED = {number for name in vars(MissionClient) if (number := id_of(name.remove
 """Messages with a handler `_on_MESSAGE`."""
 
 
-def poll_flight(firmware: str, client: MissionClient, time: float) -> FirmwareOutput:
+def poll_flight(report: LinkReport, client: MissionClient, time: float) -> FirmwareOutput:
     """Poll the client at simulation `time` [s]. Return the state of the flight, without outputs.
+
+    The version of the firmware and the parameters that it did not take go to the report.
 
     Raises:
         FirmwareError: the firmware rejects the mission.
     """
     client.poll(time)
     if client.error:
-        raise FirmwareError(f"{firmware}: {client.error} at t = {time:.3f} s; change the mission")
-    failsafe = client.texts.failsafe if client.armed else ""
-    finished = client.stage is Stage.FINISHED
-    return FirmwareOutput(
-        (), client.armed, client.landed, finished, client.mode, failsafe, tuple(client.texts.blockers)
-    )
+        raise FirmwareError(f"{report.firmware}: {client.error} at t = {time:.3f} s; change the mission")
+    report.version = client.version
+    for text in client.parameter_problems:
+        report.note(text)
+    failsafe, finished = client.texts.failsafe if client.armed else "", client.stage is Stage.FINISHED
+    blockers = tuple(client.texts.blockers)
+    return FirmwareOutput((), client.armed, client.landed, finished, client.mode, failsafe, blockers)

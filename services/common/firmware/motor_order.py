@@ -34,7 +34,12 @@ def motor_order(frame: Airframe, layout: tuple[Output, ...], firmware: str) -> t
     if len(places) != len(layout):
         message = f"{firmware} drives {len(layout)} rotors, the airframe has {len(places)}"
         raise ConfigError("airframe.rotors.position", message, f"an airframe with {len(layout)} rotors")
-    order = tuple(_nearest(place[0], place[1], layout) for place in places)
+
+    def cosine(x: float, y: float, output: Output) -> float:
+        """Return the cosine of the angle between the directions of a rotor and an output."""
+        return (x * output.forward + y * output.left) / (math.hypot(x, y) * math.hypot(output.forward, output.left))
+
+    order = tuple(max(range(len(layout)), key=lambda i: cosine(x, y, layout[i])) for x, y, _ in places)
     if sorted(order) != list(range(len(layout))):
         outputs = ", ".join(str(i + 1) for i in order)
         message = f"rotors belong to the outputs {outputs} of {firmware}"
@@ -44,13 +49,3 @@ def motor_order(frame: Airframe, layout: tuple[Output, ...], firmware: str) -> t
             message = f"rotor {k + 1} turns {spins[k]}, output {i + 1} of {firmware} expects {layout[i].spin}"
             raise ConfigError("airframe.rotors.spin_direction", message)
     return order
-
-
-def _nearest(x: float, y: float, layout: tuple[Output, ...]) -> int:
-    """Return the output whose direction from the centre is nearest to (x, y)."""
-
-    def cosine(output: Output) -> float:
-        length = math.sqrt((x * x + y * y) * (math.square(output.forward) + math.square(output.left)))
-        return (x * output.forward + y * output.left) / length
-
-    return max(range(len(layout)), key=lambda i: cosine(layout[i]))

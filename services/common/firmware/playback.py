@@ -29,10 +29,11 @@ class Playback:
         """
         self.name, self._recorded, self._service = f"{name}.playback", recorded, service
         self.outputs = tuple(outputs)
+        self._status = AutopilotStatus()
 
-    def bind(self, graph: BlockDiagram) -> None:
+    def bind(self, diagram: BlockDiagram) -> None:
         """Store the diagram."""
-        self._graph = graph
+        self._diagram = diagram
 
     def on_tick(self, tick: int) -> int:
         """Write the samples at `tick`."""
@@ -44,14 +45,12 @@ class Playback:
         command = Actuators.decode(self._recorded[topic.ACTUATORS][tick])
         reference = command.attitude_reference
         volts = tuple(map(float, command.motor_voltage))
-        self._graph.put(
-            ports.ACTUATORS,
-            tick,
-            MotorCommand(
-                volts, command.armed, tuple(map(float, command.thrust)), (reference.x, reference.y, reference.z)
-            ),
+        motors = MotorCommand(
+            volts, command.armed, tuple(map(float, command.thrust)), (reference.x, reference.y, reference.z)
         )
+        self._diagram.put(ports.ACTUATORS, tick, motors)
         if payload := self._recorded[topic.STATUS].get(tick):
             x = Status.decode(payload)
-            self._graph.put(ports.STATUS, tick, AutopilotStatus(0, 0, x.armed, x.landed, x.finished, x.battery_warning))
+            self._status = AutopilotStatus(0, 0, x.armed, x.landed, x.finished, x.battery_warning)
+        self._diagram.put(ports.STATUS, tick, self._status)
         return tick + 1

@@ -25,6 +25,8 @@ class FirmwareKeys(SceneTable):
     instance: int | None = Field(default=None, ge=0, lt=100)  # shifts ports; unset: number of the vehicle
     start_timeout: float = Field(default=60.0, gt=0.0)  # [s] until the firmware answers, without time it had no CPU
     step_timeout: float = Field(default=10.0, gt=0.0)  # [s] of silence in flight, without time it had no CPU
+    repeatable: bool = True  # two flights are equal: the threads of a program that Lapwing starts run in turns
+    schedule: int = Field(default=0, ge=0, lt=1 << 63)  # seed of the order of its threads; 0: in turn
     parameter_text: str = ""  # content of the file that `parameters` names
 
     @classmethod

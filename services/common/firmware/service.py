@@ -12,45 +12,36 @@ from lapwing.messages import topics as topic
 from lapwing.services.common import ports
 from lapwing.services.common.encoders import actuators_encoder, setpoint_encoder, status_encoder
 from lapwing.services.common.firmware.block import FirmwareBlock
-from lapwing.services.common.firmware.exchange_block import ExchangeBlock
+from lapwing.services.common.firmware.firmware_config import FirmwareConfig
 from lapwing.services.common.firmware.hold import COMMAND, HeldState, Hold
-from lapwing.services.common.firmware.hold_reference import HoldReference
-from lapwing.services.common.firmware.link import Link
 from lapwing.services.common.firmware.playback import TOPICS, Playback, Recorded
-from lapwing.services.common.firmware.setup import FirmwareSetup
 
 
 def firmware_service(
-    setup: RunConfig, name: str, create: Callable[[FirmwareSetup], Link], recorded: Recorded | None = None
+    config: RunConfig, recorded: Recorded | None = None, *, name: str, link: Callable[[FirmwareConfig], Any]
 ) -> Service:
     """Return the service of an adapter.
 
     Args:
-        setup: run configuration of one vehicle.
+        config: run configuration of one vehicle.
+        recorded: messages of a log by topic and tick, which replace the firmware; None: run the firmware.
         name: name of the service.
-        create: class of the link.
-        recorded: messages of a log to resimulate; None: run the firmware.
+        link: class of the link.
     """
-    config = setup.services[name]
-    own: FirmwareSetup = config.parameters
+    settings = config.services[name]
+    own: FirmwareConfig = settings.parameters
     if recorded is not None:
-        service = Service(name, [], [])
-        service.parts = [Playback(name, config.ports, recorded, service)]
-        service.python_topics = TOPICS if own.phases else TOPICS[:2]
+        service = Service(name, [], [], python_topics=TOPICS if own.phases else TOPICS[:2])
+        service.parts = [Playback(name, settings.ports, recorded, service)]
         return service
-    kind = ExchangeBlock if hasattr(create, "exchange") else FirmwareBlock
-    link = kind(name, own, config.inputs, create)
-    zeros = (0.0,) * len(own.order)
-    parameters: Any = Hold(own.voltage_max, zeros)
-    inputs = [InputPort(COMMAND), InputPort(ports.BATTERY)]
-    if own.phases:
-        parameters = HoldReference(parameters)
-        inputs.append(InputPort(ports.TRAJECTORY))
-    hold = Block(f"{name}.hold", parameters, Cell(HeldState(own.voltage_max)), tuple(inputs), config.ports)
+    exchange = FirmwareBlock(name, own, settings.inputs, link)
+    inputs = tuple(InputPort(port) for port in (COMMAND, ports.BATTERY, *([ports.TRAJECTORY] if own.phases else [])))
+    parameters = Hold(own.voltage_max, (0.0,) * len(own.order))
+    hold = Block(f"{name}.hold", parameters, Cell(HeldState(own.voltage_max)), inputs, settings.ports)
     phases = own.phases or ("",)
     encoders = [
-        actuators_encoder(setup.port(ports.ACTUATORS)),
-        status_encoder(own.status_every, phases, link.status_texts.table),
+        actuators_encoder(config.port(ports.ACTUATORS)),
+        status_encoder(own.status_every, phases, exchange.status_texts.table),
         *([setpoint_encoder(topic.SETPOINT, ports.SETPOINT, phases)] if own.phases else []),
     ]
-    return Service(name, [link, hold], encoders)
+    return Service(name, [exchange, hold], encoders)

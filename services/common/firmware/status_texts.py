@@ -1,6 +1,7 @@
 """Status texts and events of a firmware: its last error, failsafe, and reasons against arming."""
 
 import re
+from dataclasses import dataclass, field
 
 from lapwing.services.common.mavlink.dialect import mavlink
 
@@ -9,35 +10,24 @@ ACTIVATED = "Failsafe activated"  # status text sent with an event that has caus
 FAILSAFE = re.compile("failsafe|crash|emergency|parachute|termination", re.IGNORECASE)  # in status texts
 
 
+@dataclass
 class StatusTexts:
-    """Last error, last failsafe and reasons against arming of a firmware.
+    """Last error, last failsafe and reasons against arming of a firmware."""
 
-    Attributes:
-        error: last status text of the level error or worse.
-        failsafe: last event or status text about a failsafe since arming.
-        blockers: status texts since arming was rejected.
-    """
-
-    def __init__(self) -> None:
-        """Create an empty record."""
-        self.error = self.failsafe = ""
-        self.blockers: list[str] = []
-        self._has_event = False  # an event has named a failsafe
+    error: str = ""  # last status text of the level error or worse
+    failsafe: str = ""  # last event or status text about a failsafe since arming
+    blockers: list[str] = field(default_factory=list)  # status texts since arming was rejected
+    has_event: bool = False  # an event has named a failsafe
 
     def arm(self) -> None:
         """Clear the failsafe and the reasons from before arming."""
-        self.failsafe = ""
-        self.blockers.clear()
-
-    def add_event(self, text: str) -> None:
-        """Store the text of an event about a failsafe."""
-        self.failsafe, self._has_event = text, True
+        self.failsafe, self.blockers = "", []
 
     def add(self, text: str, severity: int, armed: bool, is_arming: bool) -> None:
         """Store a status text of a MAV_SEVERITY."""
         if severity <= mavlink.MAV_SEVERITY_ERROR:
             self.error = text
-        if armed and FAILSAFE.search(text) and not (self._has_event and text.startswith(ACTIVATED)):
+        if armed and FAILSAFE.search(text) and not (self.has_event and text.startswith(ACTIVATED)):
             self.failsafe = text
         if is_arming and severity <= mavlink.MAV_SEVERITY_WARNING:
             self.blockers = [*[old for old in self.blockers if old != text], text][-BLOCKERS:]

@@ -23,10 +23,22 @@ def _radius(item: Any) -> float:
     return item.radius if item.radius > 0.0 else 0.0
 
 
+def _circle(item: Any) -> _Params:
+    """Return the parameters of DO_ORBIT."""
+    angle, speed, behaviour = item.values[:3]
+    return -math.copysign(item.radius, angle), speed, behaviour, abs(angle)
+
+
+def _turns(item: Any) -> _Params:
+    """Return the parameters of NAV_LOITER_TURNS."""
+    return abs(item.values[0]) / math.tau, 0.0, -math.copysign(item.radius, item.values[0])
+
+
 def _turn(item: Any) -> _Params:
-    if item.values:
+    relative, *direction = item.values or (0.0,)
+    if relative:
         return math.degrees(abs(item.yaw)), 0.0, -math.copysign(1.0, item.yaw), 1.0
-    return (_heading(item.yaw) % 360.0,)
+    return _heading(item.yaw) % 360.0, 0.0, -direction[0] if direction else 0.0
 
 
 _COMMANDS: dict[str, tuple[int, Callable[[Any], _Params]]] = {  # by action: MAV_CMD and its first parameters
@@ -45,6 +57,7 @@ _COMMANDS: dict[str, tuple[int, Callable[[Any], _Params]]] = {  # by action: MAV
     "loiter": (mavlink.MAV_CMD_NAV_LOITER_UNLIM, lambda i: (0.0, 0.0, 0.0, _heading(i.yaw))),
     "gripper": (mavlink.MAV_CMD_DO_GRIPPER, lambda i: (1.0, i.values[0])),
     "loiter_to_alt": (mavlink.MAV_CMD_NAV_LOITER_TO_ALT, lambda i: ()),
+    "orbit": (mavlink.MAV_CMD_DO_ORBIT, _circle),
     "roi": (mavlink.MAV_CMD_DO_SET_ROI_LOCATION, lambda i: ()),
     "set_home": (mavlink.MAV_CMD_DO_SET_HOME, lambda i: (float(math.isnan(i.position.x)),)),
     "condition": (mavlink.MAV_CMD_CONDITION_DELAY, lambda i: (i.hold_time,)),
@@ -65,6 +78,8 @@ def _item(number: int, item: Any, kind: int, datum: Datum) -> Any:
     command, parameters = _COMMANDS[item.action]
     if item.action == "condition" and item.radius > 0.0:
         command, parameters = mavlink.MAV_CMD_CONDITION_DISTANCE, lambda i: (i.radius,)
+    if item.action == "orbit" and math.isnan(item.values[1]):
+        command, parameters = mavlink.MAV_CMD_NAV_LOITER_TURNS, _turns
     if item.action in _POSITION_UNSET and math.isnan(item.position.x):
         command = _POSITION_UNSET[item.action]
     params = (*parameters(item), 0.0, 0.0, 0.0, 0.0)[:4]

@@ -66,7 +66,7 @@ def heartbeat(v: VehicleCache) -> Any:
     if v.get(ESTIMATE) is None:
         state = mavlink.MAV_STATE_BOOT
     if s.failsafe:
-        state = mavlink.MAV_STATE_CRITICAL
+        state = mavlink.MAV_STATE_CRITICAL if s.armed else mavlink.MAV_STATE_FLIGHT_TERMINATION
     set_type = v.parameter(TYPE)  # NaN: not a parameter of this firmware
     kind = vehicle_type(len(v.description.rotors)) if math.isnan(set_type) else int(set_type)
     return mavlink.MAVLink_heartbeat_message(kind, v.firmware.AUTOPILOT, base, v.firmware.mode_number(s.mode), state, 3)

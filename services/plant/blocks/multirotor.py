@@ -10,6 +10,7 @@ from lapwing.dynamics import effects
 from lapwing.dynamics.effects._external_inputs import with_inputs_stored
 from lapwing.dynamics.effects.payload_release import RELEASED, PayloadRelease
 from lapwing.dynamics.noise import Key
+from lapwing.dynamics.vehicles import step_bound
 from lapwing.dynamics.vehicles.multirotor import advance, observe
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, MultirotorState, motion_of
 from lapwing.kernels import always_inline
@@ -90,8 +91,8 @@ def output(
         o.wind_world, o.air_density, o.in_contact, o.angular_acceleration_body,
     )  # fmt: skip
     battery = BatteryReading(o.battery[0], o.battery[1], o.battery[2], o.battery[3])
-    is_finite = finite(vehicle.motion)
-    return MultirotorPlantState(vehicle, last), (truth, battery), termination_status(tick, last, is_finite)
+    is_valid = finite(vehicle.motion) and step_bound.is_valid(motion, p.step)
+    return MultirotorPlantState(vehicle, last), (truth, battery), termination_status(tick, last, is_valid)
 
 
 @generic(inline=True)

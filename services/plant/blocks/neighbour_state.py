@@ -18,7 +18,7 @@ class NeighbourStateOutput(NamedTuple):
     """Parameters of the block."""
 
     vehicle: MultirotorParameters
-    like: NeighbourState  # prototype with the constant fields
+    example: NeighbourState  # prototype with the constant fields
     interval: float  # [s] length of a tick
 
 
@@ -39,14 +39,14 @@ def step(
     truth, vehicle = inputs[0].value, p.vehicle
     body = hooks.all_mass_properties(vehicle.effects, s.vehicle.memory, vehicle.body)
     thrust, _ = thrust_wrench(vehicle.layout, Loads(truth.rotor_thrust, truth.rotor_torque))
-    R, hook, omega = rotation_matrix(truth.attitude), p.like.hook_body, truth.omega_body
+    R, hook, omega = rotation_matrix(truth.attitude), p.example.hook_body, truth.omega_body
     turning = cross(omega, hook)
     swinging = add(cross(truth.angular_acceleration_body, hook), cross(omega, turning))
     sample = NeighbourState(
         truth.position_world, truth.velocity_world, in_world(thrust, R), body.mass, truth.air_density,
-        p.like.radius, p.like.restitution, p.like.disc_radius,
+        p.example.radius, p.example.restitution, p.example.disc_radius,
         hook, add(truth.position_world, apply(R, hook)), add(truth.velocity_world, apply(R, turning)),
         add(truth.acceleration_world, apply(R, swinging)), truth.wind_world, tick * p.interval, False,
-        p.like.friction, apply(R, omega), _inverse_inertia_world(body, R),
+        p.example.friction, apply(R, omega), _inverse_inertia_world(body, R),
     )  # fmt: skip
     return s, (sample,), CONTINUE

@@ -3,11 +3,11 @@
 from lapwing.dynamics.integrators import rate
 from lapwing.dynamics.lie.quaternion import Quaternion
 from lapwing.dynamics.vector import ZERO, Vec3
-from lapwing.dynamics.vehicles.gyrostat import GyrostatParameters
-from lapwing.dynamics.vehicles.quadrotor_os4 import Os4Parameters, Os4State
 from lapwing.dynamics.vehicles.rigid_body import RigidBody
-from lapwing.dynamics.vehicles.unloading import UnloadingParameters, UnloadingState
 from lapwing.kernels import always_inline
+from lapwing.papers.gyrostat import GyrostatParameters
+from lapwing.papers.quadrotor_os4 import Os4Parameters, Os4State
+from lapwing.papers.unloading.unloading import UnloadingParameters, UnloadingState
 from lapwing.services.common.ports import TrueState
 from lapwing.services.plant.blocks.uncontrolled import OUTPUT_FUNCTIONS
 

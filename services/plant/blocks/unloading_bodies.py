@@ -5,9 +5,9 @@ from typing import NamedTuple
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, exp
 from lapwing.dynamics.vector import ZERO, Vec3, add, scale
-from lapwing.dynamics.vehicles import unloading, unloading_contact_points
-from lapwing.dynamics.vehicles.unloading import UnloadingParameters, UnloadingState
 from lapwing.kernels import always_inline, math
+from lapwing.papers.unloading import unloading, unloading_contact_points
+from lapwing.papers.unloading.unloading import UnloadingParameters, UnloadingState
 from lapwing.services.common.ports import BodyMotions
 
 NAMES = ("pack", "door", *[f"roller{i + 1}" for i in range(unloading_contact_points.ROLLERS)], "ground")

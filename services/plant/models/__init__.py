@@ -10,7 +10,7 @@ from types import ModuleType
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics import discovery
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.services.common.vehicle_schema import Vehicle
+from lapwing.services.common.schemas.vehicle_schema import Vehicle
 
 
 def names() -> list[str]:

@@ -17,15 +17,15 @@ from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles.ground_equilibrium import static_equilibrium
 from lapwing.dynamics.vehicles.multirotor_equations import with_tolerance
 from lapwing.services.common import effect_inputs, ports
-from lapwing.services.common.communication_schema import Communication, Rates, ticks
 from lapwing.services.common.ports import BatteryReading, BodyMotions, TrueState
-from lapwing.services.common.run_schema import Run
-from lapwing.services.common.vehicle_schema import Vehicle, airframe, gravity, start_pose
+from lapwing.services.common.schemas.communication_schema import Communication, Rates, ticks
+from lapwing.services.common.schemas.run_schema import Run
+from lapwing.services.common.schemas.vehicle_schema import Vehicle, airframe, gravity, start_pose
 from lapwing.services.plant.blocks.multirotor import MultirotorPlant, MultirotorPlantState
 from lapwing.services.plant.blocks.uncontrolled import AutonomousPlant
 from lapwing.services.plant.encoders import PlantEncoding
 from lapwing.services.plant.schema import Solver, method
-from lapwing.services.plant.service_config import PlantSetup
+from lapwing.services.plant.service_config import PlantConfig
 
 
 def last_tick(scene: Scene) -> int:
@@ -94,7 +94,7 @@ def autonomous(
     core = AutonomousPlant(p, solver, steps, step, scene[Communication].interval, last_tick(scene))
     outputs = (Port(ports.TRUTH, truth), *([bodies_port(scene, len(names))] if bodies else []))
     return ServiceConfig(
-        PlantSetup(scene[Vehicle].model, core, start, message_contents(scene, bodies=names), bodies), (), outputs
+        PlantConfig(scene[Vehicle].model, core, start, message_contents(scene, bodies=names), bodies), (), outputs
     )
 
 
@@ -119,7 +119,7 @@ def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceConfig:
     battery = BatteryReading(*initial_battery_state(p.effects, start.vehicle.memory, p.layout.max_voltage))
     delay, external = exchange.loop_delay, effect_inputs.ports_of(scene, p.effects)
     return ServiceConfig(
-        PlantSetup("rigid_body", core, start, message_contents(scene, odometry=True, battery=frame.battery)),
+        PlantConfig("rigid_body", core, start, message_contents(scene, odometry=True, battery=frame.battery)),
         (InputPort(ports.ACTUATORS, delay), InputPort(ports.STATUS, delay), *(InputPort(i, delay) for i in external)),
         (Port(ports.TRUTH, truth), Port(ports.BATTERY, battery, rate_ticks(scene, "battery"))),
     )

@@ -13,10 +13,10 @@ from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.lie.quaternion import Quaternion, exp
 from lapwing.dynamics.vector import ZERO
-from lapwing.dynamics.vehicles.gyrostat import GyrostatParameters
 from lapwing.dynamics.vehicles.rigid_body import RigidBody
+from lapwing.papers.gyrostat import GyrostatParameters
 from lapwing.services.common.ports import TrueState
-from lapwing.services.common.run_schema import Triple
+from lapwing.services.common.schemas.run_schema import Triple
 from lapwing.services.plant.models._common import autonomous, check_system, reject_other_tables, require_tables
 
 Wxyz = tuple[float, float, float, float]
@@ -30,13 +30,13 @@ class Gyrostat(SceneTable):
     inertia: Triple  # [kg m^2] principal moments of the platform with its rotors
     rotor_momentum: Triple = ZERO  # [kg m^2/s] of the rotors; mean value of the third
     forcing_amplitude: float = 0.0  # ratio to the mean of the third rotor's speed
-    forcing_frequency: float = Field(default=0.0, ge=0.0)  # [rad/s]
+    forcing_frequency: float = Field(default=0.0, ge=0.0)  # [rad/s] of the forcing torque
     damping: float = Field(default=0.0, ge=0.0)  # [N m s] about z
-    linear_gain: Triple = ZERO  # [N m s]
-    cubic_gain: Triple = ZERO  # [N m s^3]
+    linear_gain: Triple = ZERO  # [N m s] torque per rate error
+    cubic_gain: Triple = ZERO  # [N m s^3] torque per cube of the rate error
     desired_rate: float = 0.0  # [rad/s] about each axis
     attitude_gain: float = Field(default=0.0, ge=0.0)  # [N m] towards `target_rotation`
-    rate_gain: float = Field(default=0.0, ge=0.0)  # [N m s]
+    rate_gain: float = Field(default=0.0, ge=0.0)  # [N m s] torque per rate error
     target_rotation: Triple = ZERO  # [rad] rotation vector of the desired attitude
     initial_attitude: Wxyz = Field(default=(1.0, 0.0, 0.0, 0.0), strict=False)  # quaternion w, x, y, z
     initial_rate: Triple  # [rad/s] body frame

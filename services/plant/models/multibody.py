@@ -1,24 +1,71 @@
 """Multirotor of five bodies, chassis and propellers on hinges, with the effects and commands of `rigid_body`."""
 
 import math
+from collections.abc import Callable
 from types import ModuleType
-from typing import Annotated, Any, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
+from numba import types
 from pydantic import BaseModel, ConfigDict, Field
 
 from lapwing.cosim.config.run_config import ServiceConfig
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.effects import _hooks as hooks
+from lapwing.dynamics.multibody.five_bodies import FiveBodies
 from lapwing.dynamics.vehicles import multirotor_euler, multirotor_multibody
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters
+from lapwing.dynamics.vehicles.multirotor_multibody_equations import joints
 from lapwing.dynamics.vehicles.multirotor_stepper import BREAK_ROUNDING
-from lapwing.services.common.communication_schema import Communication
-from lapwing.services.common.run_schema import Run
-from lapwing.services.common.vehicle_schema import Vehicle, active, airframe
-from lapwing.services.plant.blocks.body_states import FiveBodiesView
+from lapwing.kernels import always_inline
+from lapwing.kernels.codegen import generic
+from lapwing.services.common.ports import BodyMotions, PerRotor
+from lapwing.services.common.schemas.communication_schema import Communication
+from lapwing.services.common.schemas.run_schema import Run
+from lapwing.services.common.schemas.vehicle_schema import Vehicle, active, airframe
 from lapwing.services.plant.models import rigid_body
 from lapwing.services.plant.models._common import bodies_port, multirotor_plant
 from lapwing.services.plant.schema import Solver
 from lapwing.services.plant.service_config import PlantEvent
+
+
+class FiveBodiesView(NamedTuple):
+    """Parameters of the block."""
+
+    vehicle: MultirotorParameters
+    interval: float  # [s] length of a tick
+    off: PerRotor  # [V] before the first command
+
+
+@generic()
+def on_se3(x: types.Type) -> Callable:
+    """Return the bodies' poses on SE(3), from any coordinates."""
+    if x.instance_class is FiveBodies:
+        return lambda x: x
+    return lambda x: multirotor_euler.five(x)
+
+
+@always_inline
+def step(p: FiveBodiesView, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[BodyMotions], int]:
+    """Output the motions of the bodies at `tick`, and the loads of their hinges under the command of the tick."""
+    actuators = inputs[0]
+    command = actuators.value.motor_voltage if actuators.due else p.off
+    g, memory = p.vehicle, s.vehicle.memory
+    drive = MultirotorDrive(g, hooks.all_mass_properties(g.effects, memory, g.body), memory, command)
+    x = on_se3(s.vehicle.motion)
+    j = joints(drive, tick * p.interval, x)
+    a, (b, c, d, e) = x.chassis, x.propellers
+    sample = BodyMotions(
+        (a.position_world, b.position_world, c.position_world, d.position_world, e.position_world),
+        (a.attitude, b.attitude, c.attitude, d.attitude, e.attitude),
+        (a.velocity_world, b.velocity_world, c.velocity_world, d.velocity_world, e.velocity_world),
+        (a.omega_body, b.omega_body, c.omega_body, d.omega_body, e.omega_body),
+        (j[0][0], j[1][0], j[2][0], j[3][0], j[4][0]),
+        (j[0][1], j[1][1], j[2][1], j[3][1], j[4][1]),
+    )
+    return s, (sample,), CONTINUE
+
 
 NAMES = ("chassis", *[f"propeller{k + 1}" for k in range(4)])
 LARGEST_TURN = 0.5  # [rad] of a propeller in a step of the redundant coordinates
@@ -29,7 +76,7 @@ class Event(BaseModel):
     """Failure of a propeller in flight, at `time`."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-    time: float = Field(ge=0.0)  # [s]
+    time: float = Field(ge=0.0)  # [s] moment of the failure
     propeller: int = Field(ge=1, le=4)  # in the order of the airframe
     failure: Literal["locked", "free", "torn_off"]  # locked to the chassis, disconnected from its motor, or torn off
 

@@ -9,9 +9,9 @@ from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.vector import ZERO
-from lapwing.dynamics.vehicles.quadrotor_os4 import Os4Motors, Os4Parameters, Os4State
+from lapwing.papers.quadrotor_os4 import Os4Motors, Os4Parameters, Os4State
 from lapwing.services.common.ports import TrueState
-from lapwing.services.common.run_schema import Triple
+from lapwing.services.common.schemas.run_schema import Triple
 from lapwing.services.plant.models._common import autonomous, check_system, reject_other_tables, require_tables
 
 RPM = 2.0 * math.pi / 60.0  # [rad/s]
@@ -22,9 +22,9 @@ class Motors(BaseModel):
     """Four equal motors."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-    voltage: Four = Field(strict=False)  # [V]
+    voltage: Four = Field(strict=False)  # [V] of each motor
     constant: float = Field(gt=0.0)  # [N m/A] = [V s/rad], referred to the rotor's side of the gear
-    resistance: float = Field(gt=0.0)  # [ohm]
+    resistance: float = Field(gt=0.0)  # [ohm] of a motor's winding
 
 
 class Os4(SceneTable):
@@ -32,13 +32,13 @@ class Os4(SceneTable):
 
     TABLE: ClassVar[str] = "os4"
     OPTIONAL: ClassVar[bool] = True
-    mass: float = Field(gt=0.0)  # [kg]
-    inertia: Triple  # [kg m^2]
-    arm: float = Field(gt=0.0)  # [m]
-    lift_constant: float = Field(gt=0.0)  # [N s^2]
-    drag_constant: float = Field(gt=0.0)  # [N m s^2]
-    rotor_inertia: float = Field(ge=0.0)  # [kg m^2]
-    gravity: float = 9.81  # [m/s^2]
+    mass: float = Field(gt=0.0)  # [kg] of the vehicle
+    inertia: Triple  # [kg m^2] about body x, y, z
+    arm: float = Field(gt=0.0)  # [m] distance from the centre to a rotor
+    lift_constant: float = Field(gt=0.0)  # [N s^2] thrust over the squared rotor speed
+    drag_constant: float = Field(gt=0.0)  # [N m s^2] torque over the squared rotor speed
+    rotor_inertia: float = Field(ge=0.0)  # [kg m^2] of one rotor about its axis
+    gravity: float = 9.81  # [m/s^2] acceleration of free fall
     translational_drag: Triple = ZERO  # [N s/m] along the world axes
     rotor_speed_rpm: Four = Field(strict=False)  # [rpm] constant; with motors the initial speeds
     motors: Motors | None = None  # without motors the rotor speeds are constant

@@ -7,7 +7,7 @@ from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.services.common.firmware.schema import flown_by_firmware
-from lapwing.services.common.vehicle_schema import active, airframe
+from lapwing.services.common.schemas.vehicle_schema import active, airframe
 from lapwing.services.plant.models._common import check_integrator, multirotor_plant, require_tables
 
 

@@ -1,19 +1,23 @@
 """Multirotor that carries a load on a cable, with the effects and commands of `rigid_body`."""
 
 from types import ModuleType
-from typing import Any, ClassVar
+from typing import Any, ClassVar, NamedTuple
 
 from pydantic import Field
 
 from lapwing.cosim.config.run_config import ServiceConfig
+from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.vector import Vec3
 from lapwing.dynamics.vehicles import multirotor_slung
-from lapwing.dynamics.vehicles.multirotor_slung import Sling
-from lapwing.kernels import math
-from lapwing.services.common.environment_schema import environment
-from lapwing.services.common.vehicle_schema import (
+from lapwing.dynamics.vehicles.multirotor_equations import RotorLayout
+from lapwing.dynamics.vehicles.multirotor_slung import Sling, cable_force
+from lapwing.kernels import always_inline, math
+from lapwing.services.common.ports import BodyMotions
+from lapwing.services.common.schemas.environment_schema import environment
+from lapwing.services.common.schemas.vehicle_schema import (
     Vehicle,
     VehicleAirframe,
     active,
@@ -22,10 +26,24 @@ from lapwing.services.common.vehicle_schema import (
     thrust_coefficient,
     wake_slopes,
 )
-from lapwing.services.plant.blocks.slung_load import SlungLoadView
 from lapwing.services.plant.models import rigid_body
 from lapwing.services.plant.models._common import bodies_port, multirotor_plant, require_tables
 from lapwing.services.plant.schema import Solver
+
+
+class SlungLoadView(NamedTuple):
+    """Parameters of the block."""
+
+    layout: RotorLayout
+
+
+@always_inline
+def step(p: SlungLoadView, s: Any, tick: int, inputs: tuple[InputSample, ...]) -> tuple[Any, tuple[BodyMotions], int]:
+    """Output the motion of the load at `tick`, a point without rotation, and the force of the cable on it."""
+    x, zero = s.vehicle.motion, ((0.0, 0.0, 0.0),)
+    force = (cable_force(p.layout, x),)
+    return s, (BodyMotions((x.load_position,), (NO_ROTATION,), (x.load_velocity,), zero, force, zero),), CONTINUE
+
 
 NAME = "slung_load"
 FASTEST = 1.0  # maximum cable frequency times step; methods of order 4 are then accurate to 1e-2 per period

@@ -8,11 +8,11 @@ from pydantic import Field
 from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.vehicles import unloading
-from lapwing.dynamics.vehicles.unloading import Surface, UnloadingParameters, UnloadingState
-from lapwing.services.common.communication_schema import Communication
+from lapwing.papers.unloading import unloading
+from lapwing.papers.unloading.unloading import Surface, UnloadingParameters, UnloadingState
 from lapwing.services.common.ports import TrueState
-from lapwing.services.common.run_schema import Triple
+from lapwing.services.common.schemas.communication_schema import Communication
+from lapwing.services.common.schemas.run_schema import Triple
 from lapwing.services.plant.blocks import unloading_bodies
 from lapwing.services.plant.blocks.unloading_bodies import UnloadingView
 from lapwing.services.plant.models._common import autonomous, check_system, reject_other_tables, require_tables
@@ -27,27 +27,27 @@ class Unloading(SceneTable):
 
     TABLE: ClassVar[str] = "unloading"
     OPTIONAL: ClassVar[bool] = True
-    pack_mass: float = Field(gt=0.0)  # [kg]
+    pack_mass: float = Field(gt=0.0)  # [kg] of one pack
     pack_size: Triple  # [m] length, width, height
     gap: float = Field(default=0.01, ge=0.0)  # [m] between the pack and the shut door
     tilt_deg: float = Field(ge=0.0, lt=90.0)  # [deg] of the crate's floor, down towards the door
     floor_height: float = Field(gt=0.0)  # [m] of the hinge over the ground
     depth: float = Field(gt=0.0)  # [m] from the hinge to the rear wall
     width: float = Field(gt=0.0)  # [m] between the side walls
-    roller_radius: float = Field(gt=0.0)  # [m]
-    roller_spacing: float = Field(gt=0.0)  # [m]
+    roller_radius: float = Field(gt=0.0)  # [m] of the floor's rollers
+    roller_spacing: float = Field(gt=0.0)  # [m] distance between their axes
     roller_rpm: float  # [rpm] at the end of the ramp
     ramp_start: float = Field(ge=0.0)  # [s] start of the rollers, and unlocking of the door
-    ramp_duration: float = Field(gt=0.0)  # [s]
-    door_length: float = Field(gt=0.0)  # [m]
-    door_mass: float = Field(gt=0.0)  # [kg]
-    door_spring: float = Field(ge=0.0)  # [N m/rad]
+    ramp_duration: float = Field(gt=0.0)  # [s] time of the rollers' run-up
+    door_length: float = Field(gt=0.0)  # [m] from hinge to edge
+    door_mass: float = Field(gt=0.0)  # [kg] of the door
+    door_spring: float = Field(ge=0.0)  # [N m/rad] stiffness of its hinge
     door_preload: float = Field(ge=0.0)  # [rad] twist of the spring with the door shut
-    door_damping: float = Field(ge=0.0)  # [N m s/rad]
+    door_damping: float = Field(ge=0.0)  # [N m s/rad] of its hinge
     door_lock: float = Field(default=50.0, gt=0.0)  # [N m/rad] of the lock and of the stop
-    edge_radius: float = Field(default=0.003, gt=0.0)  # [m]
+    edge_radius: float = Field(default=0.003, gt=0.0)  # [m] of a pack's edges
     pickup: float = Field(gt=0.0)  # [s] removal of the pack
-    gravity: float = Field(default=9.81, ge=0.0)  # [m/s^2]
+    gravity: float = Field(default=9.81, ge=0.0)  # [m/s^2] acceleration of free fall
     roller_friction: Pair = Field(strict=False)  # coefficients, static and dynamic, of pack on rollers
     door_friction: Pair = Field(strict=False)  # coefficients, static and dynamic, of pack on door
     ground_friction: Pair = Field(strict=False)  # coefficients, static and dynamic, of pack on ground

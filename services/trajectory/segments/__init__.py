@@ -3,11 +3,9 @@
 To add a kind, add a file with one subclass of `Segment` and a test; scenes refer to it by its `kind`.
 """
 
-from pydantic import ValidationError
-
 from lapwing.dynamics import discovery
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.validation import fault
+from lapwing.dynamics.validation import validated
 from lapwing.services.trajectory.segments.segment import Segment
 
 discovery.modules(__name__)
@@ -27,7 +25,5 @@ def choose(table: object) -> Segment:
         raise ConfigError("", f"got {table!r}", f"a table with a kind of segment ({', '.join(KINDS)})")
     if not isinstance(table["kind"], str) or table["kind"] not in KINDS:
         raise ConfigError.unknown("kind", "kind of segment", table["kind"], KINDS)
-    try:
-        return KINDS[table["kind"]].model_validate(table)
-    except ValidationError as error:
-        raise fault(error, KINDS[table["kind"]]) from None
+    kind = KINDS[table["kind"]]
+    return validated(kind.model_validate, table, kind)

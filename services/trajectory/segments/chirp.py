@@ -11,10 +11,10 @@ class Chirp(Segment):
     """start + amplitude sin(phase) with a linear frequency sweep (theory, eq. (4.4))."""
 
     kind: Literal["chirp"] = "chirp"
-    amplitude: Finite  # [u]
-    start_frequency: Positive  # [Hz]
-    end_frequency: Positive  # [Hz]
-    duration: Positive  # [s]
+    amplitude: Finite  # [u] amplitude of the motion, in m or rad
+    start_frequency: Positive  # [Hz] at the start
+    end_frequency: Positive  # [Hz] at the end
+    duration: Positive  # [s] time that the segment takes
 
     def pieces(self, start: float) -> list[Piece]:
         """Return one swept piece."""

@@ -10,7 +10,7 @@ class Hold(Segment):
     """Constant at the start value for `duration`."""
 
     kind: Literal["hold"] = "hold"
-    duration: Positive  # [s]
+    duration: Positive  # [s] time that the segment takes
 
     def pieces(self, start: float) -> list[Piece]:
         """Return one constant piece."""

@@ -10,8 +10,8 @@ class MinimumJerk(Segment):
     """10 s^3 - 15 s^4 + 6 s^5 to the value `to` over `duration`: continuous acceleration (theory, eq. (4.3))."""
 
     kind: Literal["minimum_jerk"] = "minimum_jerk"
-    to: Finite  # [u]
-    duration: Positive  # [s]
+    to: Finite  # [u] value at the end, in m or rad
+    duration: Positive  # [s] time that the segment takes
 
     def pieces(self, start: float) -> list[Piece]:
         """Return one quintic piece."""

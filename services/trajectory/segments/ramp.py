@@ -12,9 +12,9 @@ class Ramp(Segment):
     """Constant rate to the value `to`, at `rate` or over `duration`."""
 
     kind: Literal["ramp"] = "ramp"
-    to: Finite  # [u]
+    to: Finite  # [u] value at the end, in m or rad
     rate: Positive | None = None  # [u/s] magnitude
-    duration: Positive | None = None  # [s]
+    duration: Positive | None = None  # [s] time that the segment takes
 
     @model_validator(mode="after")
     def _one_of_two(self) -> "Ramp":

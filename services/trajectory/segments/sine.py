@@ -11,9 +11,9 @@ class Sine(Segment):
     """start + amplitude sin(2 pi frequency t) for `duration` (theory, eq. (4.4) with f_0 = f_1)."""
 
     kind: Literal["sine"] = "sine"
-    amplitude: Finite  # [u]
-    frequency: Positive  # [Hz]
-    duration: Positive  # [s]
+    amplitude: Finite  # [u] amplitude of the motion, in m or rad
+    frequency: Positive  # [Hz] of the motion
+    duration: Positive  # [s] time that the segment takes
 
     def pieces(self, start: float) -> list[Piece]:
         """Return one sinusoidal piece."""

@@ -10,8 +10,8 @@ class Smoothstep(Segment):
     """3 s^2 - 2 s^3 to the value `to` over `duration`: continuous velocity (theory, eq. (4.2))."""
 
     kind: Literal["smoothstep"] = "smoothstep"
-    to: Finite  # [u]
-    duration: Positive  # [s]
+    to: Finite  # [u] value at the end, in m or rad
+    duration: Positive  # [s] time that the segment takes
 
     def pieces(self, start: float) -> list[Piece]:
         """Return one cubic piece."""

@@ -10,7 +10,7 @@ class Step(Segment):
     """Instantaneous jump to the value `to`."""
 
     kind: Literal["step"] = "step"
-    to: Finite  # [u]
+    to: Finite  # [u] value at the end, in m or rad
 
     def pieces(self, start: float) -> list[Piece]:
         """Return no pieces; the next segment starts at the new value."""

@@ -17,7 +17,7 @@ class Table(Segment):
 
     kind: Literal["table"] = "table"
     file: str = ""  # CSV file of the points
-    points: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=2)]  # [s], [u]
+    points: Annotated[tuple[tuple[Finite, Finite], ...], Field(min_length=2)]  # [s], [u] time and value of each point
 
     @model_validator(mode="after")
     def _ascending(self) -> "Table":

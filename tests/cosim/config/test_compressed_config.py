@@ -9,9 +9,9 @@ from lapwing.services.scene_resolver import load, resolve
 
 
 def test_compressed_run_configuration_is_exact():
-    setup = resolve(load("hover"))
-    assert decompress(compress(setup)) == to_json(setup)
-    assert decompress(to_json(setup).encode()) == to_json(setup)
+    config = resolve(load("hover"))
+    assert decompress(compress(config)) == to_json(config)
+    assert decompress(to_json(config).encode()) == to_json(config)
 
 
 @pytest.mark.parametrize(

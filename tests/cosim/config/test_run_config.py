@@ -8,19 +8,19 @@ from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.services.scene_resolver import load, resolve
 from tests.cosim.memory_log import fly
-from tests.cosim.small_graph import setup_of
+from tests.cosim.small_graph import config_of
 from tests.golden.cases import CASES
 
 
 @pytest.mark.parametrize("name", CASES)
 def test_run_configuration_of_each_scene_round_trips(name):
-    setup = CASES[name].resolve()
-    text = to_json(setup)
+    config = CASES[name].resolve()
+    text = to_json(config)
     again = from_json(text)
-    assert type(again) is type(setup)
-    assert first_difference(setup, again) is None
+    assert type(again) is type(config)
+    assert first_difference(config, again) is None
     assert to_json(again) == text
-    assert digest(again) == digest(setup)
+    assert digest(again) == digest(config)
 
 
 def test_resolution_is_deterministic_and_overrides_change_it():
@@ -36,18 +36,18 @@ def test_resolution_is_deterministic_and_overrides_change_it():
 
 @pytest.mark.long
 def test_configuration_restored_from_text_flies_to_same_digest():
-    setup = resolve(load("hover", ["run.duration=0.4", "effects.random_wind_force.sigma=1.0"]))
-    assert fly(from_json(to_json(setup))).digest == fly(setup).digest
+    config = resolve(load("delivery_mission", ["run.duration=0.4"]))
+    assert fly(from_json(to_json(config))).digest == fly(config).digest
 
 
 def test_port_and_producer_are_found_by_name():
     port = Port("wind", (0.0, 0.0), 5)
-    setup = setup_of((port,))
-    assert setup.port("wind") == port
-    assert setup.producers == {"wind": "test"}
-    assert (setup.interval, setup.duration) == (0.01, 100.0)
+    config = config_of((port,))
+    assert config.port("wind") == port
+    assert config.producers == {"wind": "test"}
+    assert (config.interval, config.duration) == (0.01, 100.0)
     with pytest.raises(LockStepError, match=r"^no service of this scene publishes rain$"):
-        setup.port("rain")
+        config.port("rain")
 
 
 def test_order_of_services_follows_ports():
@@ -55,4 +55,4 @@ def test_order_of_services_follows_ports():
         "controller": ServiceConfig(None, (InputPort("wind"),), ()),
         "weather": ServiceConfig(None, (), (Port("wind", 0.0),)),
     }
-    assert setup_of()._replace(services=services).order == ["weather", "controller"]
+    assert config_of()._replace(services=services).order == ["weather", "controller"]

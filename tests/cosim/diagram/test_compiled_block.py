@@ -10,11 +10,11 @@ from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels.cell import Cell, read
 from tests.cosim.parts.echo import Echo, Heard
-from tests.cosim.parts.readings import LIKE, Readings, expected
+from tests.cosim.parts.readings import EXAMPLE, Readings, expected
 from tests.cosim.parts.running_sum import Number, RunningSum
 from tests.cosim.small_graph import graph_of
 
-READINGS = Port("readings", LIKE)
+READINGS = Port("readings", EXAMPLE)
 
 
 def readings(every=1, port=READINGS, **signals):
@@ -22,14 +22,14 @@ def readings(every=1, port=READINGS, **signals):
 
 
 def echo(port=READINGS, delay=0, name="echo"):
-    return Block(name, Echo(1.0), Cell(0), (InputPort(port.name, delay),), (Port(name, Heard(False, LIKE, 0.0)),))
+    return Block(name, Echo(1.0), Cell(0), (InputPort(port.name, delay),), (Port(name, Heard(False, EXAMPLE, 0.0)),))
 
 
 def test_trees_survive_round_trip_through_rows():
-    graph = graph_of(readings())
+    diagram = graph_of(readings())
     for tick in range(12):
-        graph.advance(tick + 1)
-        value = graph.latest("readings", tick)
+        diagram.advance(tick + 1)
+        value = diagram.latest("readings", tick)
         assert value == expected(2.0, tick, tick + 1)
         assert [type(x) for x in (*value[:3], *value.rest)] == [float, bool, int, int, int]
         assert type(value.places[0].seen) is bool
@@ -37,28 +37,28 @@ def test_trees_survive_round_trip_through_rows():
 
 @pytest.mark.parametrize("number", [math.inf, -math.inf, -0.0, 5e-324, 2.0**53, -(2.0**53)])
 def test_block_reads_value_that_was_put(number):
-    graph = graph_of(echo(), ports=(READINGS,))
+    diagram = graph_of(echo(), ports=(READINGS,))
     values = expected(1.5, 7, 3)._replace(number=number, good=True, rest=(2**53, -(2**53)))
-    graph.put("readings", 0, values)
-    graph.advance(1)
-    received = graph.latest("echo", 0)
+    diagram.put("readings", 0, values)
+    diagram.advance(1)
+    received = diagram.latest("echo", 0)
     assert received == Heard(True, values, 1.0)
     assert math.copysign(1.0, received.value.number) == math.copysign(1.0, number)
 
 
 def test_nan_is_preserved():
-    graph = graph_of(echo(), ports=(READINGS,))
-    graph.put("readings", 0, LIKE._replace(number=math.nan))
-    graph.advance(1)
-    assert math.isnan(graph.latest("echo", 0).value.number)
+    diagram = graph_of(echo(), ports=(READINGS,))
+    diagram.put("readings", 0, EXAMPLE._replace(number=math.nan))
+    diagram.advance(1)
+    assert math.isnan(diagram.latest("echo", 0).value.number)
 
 
 @pytest.mark.parametrize("delay", [0, 1, 5, 23])
 def test_delayed_message_is_due_after_delay_for_any_page(delay):
-    graph = graph_of(readings(), echo(delay=delay), page=2)
+    diagram = graph_of(readings(), echo(delay=delay), kept_ticks=2)
     for tick in range(100):
-        graph.advance(tick + 1)
-        received = graph.latest("echo", tick)
+        diagram.advance(tick + 1)
+        received = diagram.latest("echo", tick)
         assert received.due == (tick >= delay)
         if received.due:
             assert received.value == expected(2.0, tick - delay, tick - delay + 1)
@@ -66,52 +66,52 @@ def test_delayed_message_is_due_after_delay_for_any_page(delay):
 
 @pytest.mark.parametrize("delay", [0, 1, 7])
 def test_message_of_slow_port_is_due_at_its_ticks_only(delay):
-    slow = Port("readings", LIKE, 5)
-    graph = graph_of(readings(5, slow), echo(slow, delay), page=4)
+    slow = Port("readings", EXAMPLE, 5)
+    diagram = graph_of(readings(5, slow), echo(slow, delay), kept_ticks=4)
     for tick in range(60):
-        graph.advance(tick + 1)
-        received = graph.latest("echo", tick)
+        diagram.advance(tick + 1)
+        received = diagram.latest("echo", tick)
         assert received.due == (tick >= delay and (tick - delay) % 5 == 0)
         if received.due:
             assert received.value == expected(2.0, tick - delay, (tick - delay) // 5 + 1)
 
 
 def test_latched_port_is_due_at_every_tick():
-    kept = Port("kept", LIKE, LATCHED)
-    graph = graph_of(echo(kept), ports=(kept,))
+    kept = Port("kept", EXAMPLE, LATCHED)
+    diagram = graph_of(echo(kept), ports=(kept,))
     for tick in range(20):
         if tick in (0, 7, 13):
             values = expected(3.0, tick, 1)
-            graph.put("kept", tick, values)
-        graph.advance(tick + 1)
-        assert graph.latest("echo", tick) == Heard(True, values, 1.0)
+            diagram.put("kept", tick, values)
+        diagram.advance(tick + 1)
+        assert diagram.latest("echo", tick) == Heard(True, values, 1.0)
 
 
 def test_fast_block_writes_slow_port_at_due_ticks_only():
-    port = Port("readings", LIKE, 4)
-    graph = graph_of(readings(1, port), page=8)
-    graph.advance(8)
-    assert graph.latest("readings", 3) == expected(2.0, 0, 1)
-    assert graph.latest("readings", 7) == expected(2.0, 4, 5)
+    port = Port("readings", EXAMPLE, 4)
+    diagram = graph_of(readings(1, port), kept_ticks=8)
+    diagram.advance(8)
+    assert diagram.latest("readings", 3) == expected(2.0, 0, 1)
+    assert diagram.latest("readings", 7) == expected(2.0, 4, 5)
 
 
 def test_ring_keeps_history_ticks():
-    graph = graph_of(readings(), page=8)
+    diagram = graph_of(readings(), kept_ticks=8)
     for stop in range(8, 400, 8):
-        graph.advance(stop)
+        diagram.advance(stop)
         ticks = np.arange(stop - 8, stop)
-        rows = graph.rows("readings", ticks)
+        rows = diagram.rows("readings", ticks)
         assert rows[:, 0].tolist() == (2.0 * ticks).tolist()
         assert (-rows[:, 2]).tolist() == (ticks + 1.0).tolist()
 
 
 def test_no_block_steps_after_last_tick():
-    graph = graph_of(readings(end=6), echo(), page=16)
-    graph.advance(16)
-    assert (graph.tick, graph.ended) == (7, True)
-    assert graph.latest("echo", 6).value == expected(2.0, 6, 7)
-    graph.advance(16)
-    assert graph.tick == 7
+    diagram = graph_of(readings(end=6), echo(), kept_ticks=16)
+    diagram.advance(16)
+    assert (diagram.tick, diagram.ended) == (7, True)
+    assert diagram.latest("echo", 6).value == expected(2.0, 6, 7)
+    diagram.advance(16)
+    assert diagram.tick == 7
 
 
 def test_failure_raises_error_of_block_or_names_block():
@@ -121,10 +121,10 @@ def test_failure_raises_error_of_block_or_names_block():
     ):
         part = readings(failure=4)
         part.failure = error
-        graph = graph_of(part, page=16)
+        diagram = graph_of(part, kept_ticks=16)
         with pytest.raises(LockStepError if error is None else ValueError, match=f"^{output}$"):
-            graph.advance(16)
-        assert graph.tick == 4  # earlier ticks can be recorded
+            diagram.advance(16)
+        assert diagram.tick == 4  # earlier ticks can be recorded
 
 
 def test_equal_blocks_have_separate_states_and_parameters():
@@ -133,11 +133,11 @@ def test_equal_blocks_have_separate_states_and_parameters():
         Block(f"sum{i}", RunningSum(weight), Cell(0.0), (InputPort("numbers"),), (Port(f"sum{i}", Number(0.0)),))
         for i, weight in enumerate((1.0, -10.0))
     ]
-    graph = graph_of(*parts, ports=(numbers,))
+    diagram = graph_of(*parts, ports=(numbers,))
     for tick in range(5):
-        graph.put("numbers", tick, Number(tick + 1.0))
-        graph.advance(tick + 1)
-    assert [graph.latest(f"sum{i}", 4).value for i in range(2)] == [15.0, -150.0]
+        diagram.put("numbers", tick, Number(tick + 1.0))
+        diagram.advance(tick + 1)
+    assert [diagram.latest(f"sum{i}", 4).value for i in range(2)] == [15.0, -150.0]
     assert [read(part.state) for part in parts] == [15.0, -150.0]
 
 
@@ -147,10 +147,10 @@ def test_blocks_with_common_cell_share_state():
         Block(f"sum{i}", RunningSum(1.0), shared, (InputPort("numbers"),), (Port(f"sum{i}", Number(0.0)),))
         for i in range(2)
     ]
-    graph = graph_of(*parts, ports=(numbers,))
-    graph.put("numbers", 0, Number(3.0))
-    graph.advance(1)
-    assert [graph.latest(f"sum{i}", 0).value for i in range(2)] == [3.0, 6.0]
+    diagram = graph_of(*parts, ports=(numbers,))
+    diagram.put("numbers", 0, Number(3.0))
+    diagram.advance(1)
+    assert [diagram.latest(f"sum{i}", 0).value for i in range(2)] == [3.0, 6.0]
 
 
 def test_block_may_be_bound_in_two_diagrams():

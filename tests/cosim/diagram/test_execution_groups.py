@@ -26,9 +26,9 @@ def counters(together, **parameters):
     ]
 
 
-def counted(graph, *names):
+def counted(diagram, *names):
     """Return the outputs of each block at every tick before the diagram's."""
-    return [[graph.latest(name, tick) for tick in range(max(0, graph.tick - 8), graph.tick)] for name in names]
+    return [[diagram.latest(name, tick) for tick in range(max(0, diagram.tick - 8), diagram.tick)] for name in names]
 
 
 def test_coupled_blocks_share_execution_group():
@@ -49,11 +49,11 @@ def test_coupled_blocks_share_execution_group():
 @pytest.mark.parametrize("last", [(7, 9), (9, 7), (3, 9), (9, 3)])
 @pytest.mark.parametrize("pages", [(100,), (4, 8, 12), range(1, 20)])
 def test_run_ends_with_last_vehicle_at_equal_ticks(last, pages, together):
-    graph = graph_of(*counters(together, a=Counter(last[0]), b=Counter(last[1])), page=16)
+    diagram = graph_of(*counters(together, a=Counter(last[0]), b=Counter(last[1])), kept_ticks=16)
     for stop in pages:
-        graph.advance(stop)
-    assert (graph.ended, graph.tick) == (True, 10)
-    assert counted(graph, "a", "b") == [list(range(2, 10))] * 2
+        diagram.advance(stop)
+    assert (diagram.ended, diagram.tick) == (True, 10)
+    assert counted(diagram, "a", "b") == [list(range(2, 10))] * 2
 
 
 @pytest.mark.parametrize("together", TOGETHER.values(), ids=TOGETHER)
@@ -69,12 +69,12 @@ def test_run_ends_with_last_vehicle_at_equal_ticks(last, pages, together):
     ],
 )
 def test_first_failure_is_raised_at_equal_ticks(a, b, c, together):
-    graph = graph_of(*counters(together, a=a, b=b, c=c), page=16)
+    diagram = graph_of(*counters(together, a=a, b=b, c=c), kept_ticks=16)
     failing = next(name for name, p in (("a", a), ("b", b), ("c", c)) if p.fails == 5)
     with pytest.raises(DivergedError, match=f"^{failing}: .* at tick 5$"):
-        graph.advance(12)
-    assert (graph.ended, graph.tick) == (False, 5)
-    assert counted(graph, "a", "b", "c") == [list(range(5))] * 3
+        diagram.advance(12)
+    assert (diagram.ended, diagram.tick) == (False, 5)
+    assert counted(diagram, "a", "b", "c") == [list(range(5))] * 3
 
 
 class Speaker:
@@ -86,7 +86,7 @@ class Speaker:
         self.name = self.vehicle = vehicle
         self._messages = messages
 
-    def bind(self, graph):
+    def bind(self, diagram):
         pass
 
     def on_tick(self, tick):
@@ -96,35 +96,11 @@ class Speaker:
 
 @pytest.mark.parametrize("together", TOGETHER.values(), ids=TOGETHER)
 def test_messages_are_in_order_of_ticks(together):
-    graph = graph_of(*counters(together, a=Counter(20), b=Counter(20)))
-    output = graph.services[0].messages
+    diagram = graph_of(*counters(together, a=Counter(20), b=Counter(20)))
+    output = diagram.services[0].messages
     speakers = [Speaker(name, output) for name in "ab"]
-    graph = graph_of(*counters(together, a=Counter(20), b=Counter(20)), *speakers)
-    graph.services[0].messages = output
-    graph.advance(6)
-    graph.advance(12)
+    diagram = graph_of(*counters(together, a=Counter(20), b=Counter(20)), *speakers)
+    diagram.services[0].messages = output
+    diagram.advance(6)
+    diagram.advance(12)
     assert output == [(name, tick, b"") for tick in (0, 3, 6, 9) for name in "ab"]
-
-
-class Clock:
-    """Python block that owns the clock."""
-
-    name, outputs = "clock", ()
-
-    def __init__(self, last):
-        self._last = last
-
-    def bind(self, graph):
-        self._graph = graph
-
-    def on_tick(self, tick):
-        if tick == self._last:
-            self._graph.finish()
-        return tick + 1
-
-
-def test_python_clock_owner_ends_run():
-    graph = graph_of(Clock(3), Block("a", Counter(20), Cell(0), (), (Port("a", 0),)), page=16)
-    graph.advance(100)
-    assert (graph.ended, graph.tick) == (True, 4)
-    assert graph.latest("a", 3) == 3

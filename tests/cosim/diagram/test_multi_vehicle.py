@@ -8,7 +8,7 @@ from lapwing.cosim.config.serialise import first_difference, from_json, to_json
 from lapwing.cosim.diagram.block_diagram import NEVER, BlockDiagram, Service
 from lapwing.cosim.diagram.compiled_block import Block
 from lapwing.cosim.diagram.multi_vehicle import member, members, merge_services
-from lapwing.cosim.executors.single_process import PAGE
+from lapwing.cosim.executors.single_process import KEPT_TICKS
 from lapwing.cosim.run_errors import DivergedError
 from lapwing.cosim.scene import SceneError
 from lapwing.kernels import on_compile
@@ -47,25 +47,25 @@ def fleet_of(n, tmp_path):
 
 
 @pytest.fixture(scope="module")
-def setup():
+def config():
     return resolve(load("fleet", SHORT))
 
 
 @pytest.fixture(scope="module")
-def flown(setup):
-    return fly(setup)
+def flown(config):
+    return fly(config)
 
 
 @pytest.mark.parametrize("vehicle", ["left", "right", "scout"])
-def test_vehicle_in_fleet_publishes_as_alone(vehicle, setup, flown):
-    alone = fly(member(setup, vehicle))
+def test_vehicle_in_fleet_publishes_as_alone(vehicle, config, flown):
+    alone = fly(member(config, vehicle))
     own = {name: topic for name, topic in alone.topics.items() if topic not in (CLOCK, TF)}
     assert {name for name in flown.topics if name.startswith(f"{vehicle}/")} == {f"{vehicle}/{name}" for name in own}
     for name in own:
         assert flown.payloads(f"{vehicle}/{name}") == alone.payloads(name), name
     assert alone.payloads("clock") == flown.payloads("clock")
     transforms = [payload for _, payload in flown.payloads("tf")]
-    assert [payload for _, payload in alone.payloads("tf")] == transforms[setup.vehicles.index(vehicle) :: 3]
+    assert [payload for _, payload in alone.payloads("tf")] == transforms[config.vehicles.index(vehicle) :: 3]
 
 
 def test_random_numbers_differ_by_vehicle(flown):
@@ -81,18 +81,18 @@ def test_vehicle_and_path_start_at_initial_position(flown):
     assert flown.view("scout/estimate").position[0, :2] == pytest.approx((-3.0, 0.0), abs=0.1)
 
 
-def test_separate_diagrams_have_equal_results(setup, flown):
-    apart = fly_apart(setup, None)
+def test_separate_diagrams_have_equal_results(config, flown):
+    apart = fly_apart(config, None)
     assert apart.topics.keys() == flown.topics.keys()
     assert apart.digest == flown.digest
 
 
 def test_additional_vehicle_of_type_compiles_no_kernel(tmp_path):
     two, three = (resolve(fleet_of(n, tmp_path)) for n in (2, 3))
-    BlockDiagram(two, create_all(two), PAGE).advance(1)
+    BlockDiagram(two, create_all(two), KEPT_TICKS).advance(1)
     compiled = []
     on_compile(compiled.append)
-    BlockDiagram(three, create_all(three), PAGE).advance(1)
+    BlockDiagram(three, create_all(three), KEPT_TICKS).advance(1)
     assert compiled == []
 
 
@@ -104,7 +104,7 @@ class Waking:
     def __init__(self, vehicle):
         self.vehicle, self.ticks = vehicle, []
 
-    def bind(self, graph):
+    def bind(self, diagram):
         pass
 
     def on_tick(self, tick):
@@ -116,24 +116,24 @@ def test_python_blocks_wake_per_vehicle_until_last_vehicle_ends():
     requested = Waking("a"), Waking("b")
     signals = {"a": Signals(5, 7), "b": Signals(2, 9)}
     compiled = [Block(name, p, Cell(0.0), vehicle=name) for name, p in signals.items()]
-    graph = graph_of(*compiled, *requested)
-    graph.advance(100)
-    assert (graph.ended, graph.tick) == (True, 10)
+    diagram = graph_of(*compiled, *requested)
+    diagram.advance(100)
+    assert (diagram.ended, diagram.tick) == (True, 10)
     assert [part.ticks for part in requested] == [[0, 5], [0, 2]]
 
 
-def test_fleet_config_survives_text_and_another_seed(setup):
+def test_fleet_config_survives_text_and_another_seed(config):
     scene = load("fleet", SHORT)
-    for vehicle, result in zip(scene.vehicles, members(setup), strict=True):
+    for vehicle, result in zip(scene.vehicles, members(config), strict=True):
         assert first_difference(result, resolve(vehicle)) is None
-    assert first_difference(from_json(to_json(setup)), setup) is None
-    assert first_difference(resolve(from_resolved(setup.resolved, "fleet")), setup) is None
-    assert first_difference(reseed(setup, 7), resolve(load("fleet", [*SHORT, "run.seed=7"]))) is None
+    assert first_difference(from_json(to_json(config)), config) is None
+    assert first_difference(resolve(from_resolved(config.resolved, "fleet")), config) is None
+    assert first_difference(reseed(config, 7), resolve(load("fleet", [*SHORT, "run.seed=7"]))) is None
 
 
-def test_invalid_state_error_names_vehicle(setup):
+def test_invalid_state_error_names_vehicle(config):
     part = Block("plant", None, None, failure=lambda tick: DivergedError(f"not finite at tick {tick}"))
-    joined = merge_services("plant", [(member(setup, "right"), Service("plant", [part], []))])
+    joined = merge_services("plant", [(member(config, "right"), Service("plant", [part], []))])
     error = joined.parts[0].failure(3)
     assert (type(error), str(error)) == (DivergedError, "right: not finite at tick 3")
 

@@ -88,9 +88,9 @@ def test_input_without_producer_is_named_with_consumer():
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
 @pytest.mark.parametrize("coupling", ["gauss_seidel", "jacobi"])
 def test_every_scene_has_execution_order(path, coupling):
-    setup = resolve(load(path, [f"communication.coupling={coupling}"]))
-    assert sorted(setup.order) == sorted(setup.services)
-    place = {name: i for i, name in enumerate(setup.order)}
-    for name, service in setup.services.items():
+    config = resolve(load(path, [f"communication.coupling={coupling}"]))
+    assert sorted(config.order) == sorted(config.services)
+    place = {name: i for i, name in enumerate(config.order)}
+    for name, service in config.services.items():
         for needed in service.inputs:
-            assert needed.delay > 0 or place[setup.producers[needed.port]] < place[name]
+            assert needed.delay > 0 or place[config.producers[needed.port]] < place[name]

@@ -45,19 +45,19 @@ WORDS = (
 )
 
 
-def random_value(like, random):
-    """Return a tree like `like` with random numbers; integers are 0, 1 or 2."""
-    if isinstance(like, tuple):
-        items = [random_value(item, random) for item in like]
-        return type(like)(*items) if hasattr(like, "_fields") else tuple(items)
-    if isinstance(like, bool | int):
-        return type(like)(random.integers(2 if isinstance(like, bool) else 3))
+def random_value(example, random):
+    """Return a tree like `example` with random numbers; integers are 0, 1 or 2."""
+    if isinstance(example, tuple):
+        items = [random_value(item, random) for item in example]
+        return type(example)(*items) if hasattr(example, "_fields") else tuple(items)
+    if isinstance(example, bool | int):
+        return type(example)(random.integers(2 if isinstance(example, bool) else 3))
     return abs(random.standard_normal())
 
 
-def known(setup, services):
+def known(config, services):
     """Return the constant contents of messages from the run configuration."""
-    values = {name: service.parameters for name, service in setup.services.items()}
+    values = {name: service.parameters for name, service in config.services.items()}
     commander = next((p for s in services for p in s.parts if p.name == "autopilot.commander"), None)
     phases, words = values["trajectory"].phases if "trajectory" in values else (), WORDS
     if commander is not None:
@@ -72,7 +72,7 @@ def known(setup, services):
     encoding = values["plant"].encoding
     sensors = [instrument.sensor for instrument in values["sensors"].instruments] if "sensors" in values else []
     return SimpleNamespace(
-        vehicle=setup.vehicle, cells=encoding.cells, capacity=encoding.capacity, bodies=encoding.bodies,
+        vehicle=config.vehicle, cells=encoding.cells, capacity=encoding.capacity, bodies=encoding.bodies,
         sonar=values["sensors"].sonar if "sensors" in values else None, phases=phases, words=words,
         rangefinder=next((sensor for sensor in sensors if isinstance(sensor, Rangefinder)), None),
     )  # fmt: skip
@@ -88,26 +88,26 @@ def fitting(value, texts, random):
 @pytest.mark.parametrize("path", SCENES, ids=lambda path: path.stem)
 def test_columnar_encoding_equals_scalar_encoding(path):
     vehicles = members(resolve(load(path)))
-    for setup in {vehicles[0].vehicle: vehicles[0], vehicles[-1].vehicle: vehicles[-1]}.values():
-        check_every_topic(setup, np.random.default_rng(5))
+    for config in {vehicles[0].vehicle: vehicles[0], vehicles[-1].vehicle: vehicles[-1]}.values():
+        check_every_topic(config, np.random.default_rng(5))
 
 
-def check_every_topic(setup, random):
-    services = create_all(setup)
-    inputs = known(setup, services)
+def check_every_topic(config, random):
+    services = create_all(config)
+    inputs = known(config, services)
     for encoder in (encoder for service in services for encoder in service.encoders):
         ticks = due_ticks(FIRST, FIRST + COUNT * encoder.period, encoder.period)
-        port = setup.port(encoder.port)
-        trajectory = setup.services.get("trajectory")
+        port = config.port(encoder.port)
+        trajectory = config.services.get("trajectory")
         texts = trajectory.parameters.phases if encoder.port == "trajectory" else inputs.phases
-        values = [fitting(random_value(port.like, random), texts, random) for _ in ticks]
+        values = [fitting(random_value(port.example, random), texts, random) for _ in ticks]
         rows = np.array([pack_row(value) for value in values])
-        pages = list(encode(encoder, port, setup, ticks, rows))
-        result = {int(t): p.tobytes() for page in pages for t, p in zip(page.ticks, page.payloads, strict=True)}
-        assert sum(len(page.ticks) for page in pages) == len(result) == len(ticks)
+        batches = list(encode(encoder, port, config, ticks, rows))
+        result = {int(t): p.tobytes() for batch in batches for t, p in zip(batch.ticks, batch.payloads, strict=True)}
+        assert sum(len(batch.ticks) for batch in batches) == len(result) == len(ticks)
         for tick, value in zip(ticks, values, strict=True):
-            assert row_unpacker(port.like)(pack_row(value)) == value
-            expected = BUILDERS[encoder.topic](inputs, int(tick) * setup.interval_ns, value)
+            assert row_unpacker(port.example)(pack_row(value)) == value
+            expected = BUILDERS[encoder.topic](inputs, int(tick) * config.interval_ns, value)
             assert result[tick] == expected.encode(), encoder.topic.name
 
 
@@ -142,7 +142,7 @@ class Named(NamedTuple):
 
 def test_batch_is_split_by_text_in_order_of_ticks():
     texts = ["climb", "on the way", "climb again"]
-    setup = SimpleNamespace(interval_ns=4_000_000)
+    config = SimpleNamespace(interval_ns=4_000_000)
     encoder = TopicEncoder(
         SETPOINT, "it", 1,
         lambda x, time_ns: {**stamp_columns(time_ns), "yaw": x.number},
@@ -150,11 +150,11 @@ def test_batch_is_split_by_text_in_order_of_ticks():
         lambda x: [x.text],
     )  # fmt: skip
     rows = np.array([(0.5, 1), (1.5, 0), (2.5, 1), (3.5, 2), (4.5, 0)])
-    pages = list(encode(encoder, Port("it", Named(0.0, 0)), setup, np.arange(7, 12), rows))
+    batches = list(encode(encoder, Port("it", Named(0.0, 0)), config, np.arange(7, 12), rows))
     result = [
         (int(tick), Setpoint.decode(payload.tobytes()))
-        for page in pages
-        for tick, payload in zip(page.ticks, page.payloads, strict=True)
+        for batch in batches
+        for tick, payload in zip(batch.ticks, batch.payloads, strict=True)
     ]
     assert [(tick, m.phase, m.yaw) for tick, m in result] == [
         (8, "climb", 1.5), (11, "climb", 4.5), (7, "on the way", 0.5), (9, "on the way", 2.5), (10, "climb again", 3.5)
@@ -175,3 +175,13 @@ def test_batch_is_split_by_text_in_order_of_ticks():
 )
 def test_ticks_at_which_message_is_due(first, stop, period, ticks):
     assert due_ticks(first, stop, period).tolist() == ticks
+
+
+@pytest.mark.parametrize("stops", [[30], [1, 2, 7, 8, 9, 30], list(range(1, 31))])
+def test_message_at_every_change_for_any_length_of_pages(stops):
+    rows = np.zeros((30, 2))
+    rows[7:9, 0], rows[20:, 1] = 1.0, 3.0  # changes at the ticks 7, 9 and 20
+    encoder = TopicEncoder(SETPOINT, "status", 10, dict, dict, on_change=True)
+    starts = [0, *stops[:-1]]
+    ticks = [encoder.message_ticks(first, stop, lambda t: rows[t]) for first, stop in zip(starts, stops, strict=True)]
+    assert np.concatenate(ticks).tolist() == [0, 7, 9, 10, 20]

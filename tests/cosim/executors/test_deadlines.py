@@ -8,7 +8,7 @@ import pytest
 from lapwing import Flight
 from lapwing.cosim.executors.deadlines import MISSED, WORST, Deadlines, Lateness, lateness, metadata_entries
 from lapwing.cosim.log import LogReader
-from lapwing.studies.report.flight_header import facts
+from lapwing.views.report.flight_header import facts
 
 pytestmark = pytest.mark.long
 

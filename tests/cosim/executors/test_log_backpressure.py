@@ -18,7 +18,7 @@ from lapwing.cosim.executors.log_backpressure import (
 )
 from lapwing.cosim.log import LogWriter
 from lapwing.cosim.log.log_sequencer import SHORTEST
-from lapwing.cosim.transport.packet_exchange import PAGE
+from lapwing.cosim.transport.packet_exchange import PACKET_TICKS
 from lapwing.messages import Clock, stamp
 
 
@@ -45,7 +45,7 @@ class Process:
 
     def __init__(self, vehicles=1):
         self.bus, self.waits = Bus(), []
-        self.setup = SimpleNamespace(vehicles=["drone"] * vehicles)
+        self.config = SimpleNamespace(vehicles=["drone"] * vehicles)
 
     def wait_with_status(self, get, waiting_for):
         self.waits.append(waiting_for())
@@ -79,7 +79,7 @@ def test_allowed_lead_over_log_shrinks_with_vehicles(vehicles, ahead):
 
 
 def test_allowed_lead_covers_unrecorded_ticks():
-    assert LEAST >= PAGE + LOOK + SHORTEST  # an unsent log packet and an incomplete chunk
+    assert LEAST >= PACKET_TICKS + LOOK + SHORTEST  # an unsent log packet and an incomplete chunk
 
 
 def test_progress_reports_waiting_for_disk():

@@ -24,7 +24,7 @@ class Reading(NamedTuple):
     rest: tuple[int, ...]
 
 
-LIKE = Reading(0.0, False, 0, (Place((0.0,) * 3, False),) * 2, (0, 0))
+EXAMPLE = Reading(0.0, False, 0, (Place((0.0,) * 3, False),) * 2, (0, 0))
 
 
 class Readings(NamedTuple):

@@ -10,8 +10,7 @@ from pathlib import Path
 
 import pytest
 
-from lapwing.cosim.processes.child_process import start_early
-from lapwing.cosim.processes.forked_process import Forked
+from lapwing.cosim.processes.child_process import Forked, start_early
 
 
 def test_unused_early_child_is_terminated():

@@ -12,6 +12,7 @@ import pytest
 from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.processes import cpu_starvation
 from lapwing.cosim.processes.cpu_starvation import QUIET, Starvation, machine_stall_time, starved_time
+from lapwing.cosim.processes.patience import Patience, process_state
 from lapwing.cosim.processes.run_monitor import LONGEST, RunMonitor
 
 pytestmark = pytest.mark.skipif(not os.path.exists("/proc/self/schedstat"), reason="the system does not tell")
@@ -146,3 +147,20 @@ def test_starved_service_is_not_reported_as_router_stall():
 def test_starvation_excuse_is_bounded(watch):
     silent_for(watch, LONGEST + 0.1)
     assert watch.stall_message(["plant"], lambda who: LONGEST)
+
+
+def test_timeout_does_not_pass_while_process_is_stopped(start):
+    pid, now = start(SLEEP), [0.0]
+    patience = Patience(1.0, pid, pauses=True, clock=lambda: now[0])
+    os.kill(pid, signal.SIGSTOP)
+    while process_state(pid) != "T":
+        time.sleep(0.01)
+    for now[0] in range(100):
+        assert not patience.over
+    os.kill(pid, signal.SIGCONT)
+    while process_state(pid) == "T":
+        time.sleep(0.01)
+    now[0] += 0.9
+    assert not patience.over
+    now[0] += 20.0
+    assert patience.over

@@ -13,9 +13,9 @@ from lapwing.cosim.scene import Scene, SceneError
 from lapwing.cosim.scene.files import parse_toml
 from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.common.autopilot_parameters import table
-from lapwing.services.common.communication_schema import Communication, Rates
-from lapwing.services.common.run_schema import Run
-from lapwing.services.common.vehicle_schema import Vehicle, airframe, gravity, start_height
+from lapwing.services.common.schemas.communication_schema import Communication, Rates
+from lapwing.services.common.schemas.run_schema import Run
+from lapwing.services.common.schemas.vehicle_schema import Vehicle, airframe, gravity, start_height
 from lapwing.services.scene_resolver import from_resolved, load, vocabulary
 from lapwing.services.trajectory.schema import Trajectory
 

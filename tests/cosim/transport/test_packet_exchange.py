@@ -46,13 +46,13 @@ class Counts:
     def __init__(self, outputs):
         self.outputs = outputs
 
-    def bind(self, graph):
-        self.graph = graph
+    def bind(self, diagram):
+        self.diagram = diagram
 
     def on_tick(self, tick):
         for port in self.outputs:
             if due(tick, port.period, 0) >= 0:
-                self.graph.put(port.name, tick, float(tick))
+                self.diagram.put(port.name, tick, float(tick))
         return tick + 1
 
 
@@ -68,7 +68,7 @@ class Takes(Counts):
         for i in self.inputs:
             stamp = due(tick, PERIODS[NAMES.index(i.port)], i.delay)
             if stamp >= 0:
-                self.noted.append((i.port, stamp, self.graph.latest(i.port, stamp)))
+                self.noted.append((i.port, stamp, self.diagram.latest(i.port, stamp)))
         return tick + 1
 
 
@@ -76,17 +76,17 @@ def exchanged(inputs):
     """Return the samples received by the consumer, and the number of packets by key."""
     ports = tuple(Port(name, 0.0, period) for name, period in zip(NAMES, PERIODS, strict=True))
     services = {"giver": ServiceConfig(None, (), ports), "taker": ServiceConfig(None, inputs, ())}
-    setup = RunConfig("", "", 1, LAST, 250, 4_000_000, "gauss_seidel", "drone1", services, {}, {})
+    config = RunConfig("", "", 1, LAST, 250, 4_000_000, "gauss_seidel", "drone1", services, {}, {})
     bus = Bus()
 
     def process(name):
         return SimpleNamespace(
-            setup=setup, name=name, bus=bus, participants=PublisherIds("test"), key_prefix="test",
+            config=config, name=name, bus=bus, participants=PublisherIds("test"), key_prefix="test",
             report_rejected=lambda: None, key=str, packs_ticks=True, abandoned="",
         )  # fmt: skip
 
     giver, taker = Service("giver", [Counts(ports)], []), Service("taker", [Takes(inputs)], [])
-    given_rows, taken_rows = BlockDiagram(setup, [giver], 2048), BlockDiagram(setup, [taker], 2048)
+    given_rows, taken_rows = BlockDiagram(config, [giver], 2048), BlockDiagram(config, [taker], 2048)
     outlets, (source,) = (
         PacketSender(process("giver"), giver, given_rows),
         packet_receivers(process("taker"), taken_rows),

@@ -13,8 +13,8 @@ from lapwing.services.scene_resolver import load, resolve
 
 
 def test_columns_have_order_of_row():
-    like = MotorCommand((1.0, 2.0, 3.0, 4.0), True, (5.0, 6.0, 7.0, 8.0), (9.0, 10.0, 11.0))
-    named = dict(zip(columns(like), pack_row(like), strict=True))
+    example = MotorCommand((1.0, 2.0, 3.0, 4.0), True, (5.0, 6.0, 7.0, 8.0), (9.0, 10.0, 11.0))
+    named = dict(zip(columns(example), pack_row(example), strict=True))
     assert named["motor_voltage.2"] == 3.0
     assert named["armed"] == 1.0
     assert named["attitude_reference.0"] == 9.0
@@ -23,12 +23,12 @@ def test_columns_have_order_of_row():
 
 @pytest.mark.long
 def test_packet_length_equals_layout():
-    setup = resolve(load("hover"))
-    reported = layout(setup)
-    assert reported["setup"] == to_json(setup)
-    graph = BlockDiagram(setup, create_all(setup), 64)
-    graph.advance(26)
+    config = resolve(load("hover"))
+    reported = layout(config)
+    assert reported["config"] == to_json(config)
+    diagram = BlockDiagram(config, create_all(config), 64)
+    diagram.advance(26)
     for name, service in reported["services"].items():
         for tick in (24, 25):
             expected = 8 * sum(len(p["columns"]) for p in service["ports"] if tick % p["period"] == 0)
-            assert len(StepPacketCodec(setup.services[name].ports).pack(graph, tick)) == expected
+            assert len(StepPacketCodec(config.services[name].ports).pack(diagram, tick)) == expected

@@ -19,7 +19,7 @@ LAST = 120  # [tick]
 NAMES = ("plant", "sensors", "autopilot", "trajectory", "another")
 
 
-def setup_of(links):
+def config_of(links):
     """Return services with these connections: (producer, consumer): delay [ticks]."""
     services = {
         name: ServiceConfig(
@@ -30,24 +30,25 @@ def setup_of(links):
     return RunConfig("", "", 1, LAST, 250, 4_000_000, "gauss_seidel", "drone1", services, {}, {})
 
 
-def newest_needed(setup, producer, consumer, tick):
+def newest_needed(config, producer, consumer, tick):
     """Return the newest tick of the producer that the consumer reads at `tick`; negative: none."""
-    return max(tick - i.delay for i in setup.services[consumer].inputs if i.port == producer)
+    return max(tick - i.delay for i in config.services[consumer].inputs if i.port == producer)
 
 
-def end(setup):
+def end(config):
     """Return the ticks of each service when none can continue, in the order of `lapwing.cosim.executors.lockstep`."""
-    stepped = dict.fromkeys(setup.services, 0)
+    stepped = dict.fromkeys(config.services, 0)
     moved = True
     while moved and min(stepped.values()) <= LAST:
         moved = False
-        for name, service in setup.services.items():
+        for name, service in config.services.items():
             values = {
-                i.port: stepped[i.port] // (n := packet_schedule(setup, i.port, name).ticks) * n for i in service.inputs
+                i.port: stepped[i.port] // (n := packet_schedule(config, i.port, name).ticks) * n
+                for i in service.inputs
             }
             ready = stepped[name]
-            while ready < stepped[name] + ticks_per_packet(setup, name) and all(
-                newest_needed(setup, producer, name, ready) < there for producer, there in values.items()
+            while ready < stepped[name] + ticks_per_packet(config, name) and all(
+                newest_needed(config, producer, name, ready) < there for producer, there in values.items()
             ):
                 ready += 1
             ready = min(ready, LAST + 50)
@@ -67,22 +68,22 @@ pairs = st.tuples(st.sampled_from(NAMES), st.sampled_from(NAMES)).filter(lambda 
 @example({("plant", "trajectory"): 9, ("trajectory", "another"): 9, ("another", "plant"): 0})
 @example({("plant", "trajectory"): 25, ("trajectory", "another"): 3, ("another", "plant"): 1})
 def test_packet_schedule_cannot_deadlock(links):
-    setup = setup_of(links)
+    config = config_of(links)
     try:
-        assert setup.order
+        assert config.order
     except LockStepError:
         return  # algebraic loops are rejected
-    assert min(end(setup).values()) > LAST
+    assert min(end(config).values()) > LAST
 
 
 def test_only_leading_service_packs_several_ticks():
-    setup = resolve(load("delivery_mission"))
-    assert {name: ticks_per_packet(setup, name) for name in setup.services} == {
+    config = resolve(load("delivery_mission"))
+    assert {name: ticks_per_packet(config, name) for name in config.services} == {
         "plant": 1, "sensors": 1, "autopilot": 1, "trajectory": 25,
     }  # fmt: skip
-    assert packet_schedules(setup, "plant") == {EACH_TICK, PacketSchedule(25, 25), PacketSchedule(1, 25)}
-    assert packet_schedules(setup, "trajectory") == {PacketSchedule(25, 25)}
-    assert packet_schedules(setup, "sensors") == packet_schedules(setup, "autopilot") == {EACH_TICK}
+    assert packet_schedules(config, "plant") == {EACH_TICK, PacketSchedule(25, 25), PacketSchedule(1, 25)}
+    assert packet_schedules(config, "trajectory") == {PacketSchedule(25, 25)}
+    assert packet_schedules(config, "sensors") == packet_schedules(config, "autopilot") == {EACH_TICK}
 
 
 def test_packet_schedules_have_unique_keys():
@@ -92,7 +93,7 @@ def test_packet_schedules_have_unique_keys():
 
 
 def test_battery_has_separate_packets():
-    setup = resolve(load("delivery_mission"))
-    schedule = packet_schedule(setup, "plant", "autopilot")
-    assert [port.name for port in schedule.ports(setup.services["plant"].ports)] == ["battery"]
-    assert packet_schedule(setup, "plant", "sensors") == EACH_TICK
+    config = resolve(load("delivery_mission"))
+    schedule = packet_schedule(config, "plant", "autopilot")
+    assert [port.name for port in schedule.ports(config.services["plant"].ports)] == ["battery"]
+    assert packet_schedule(config, "plant", "sensors") == EACH_TICK

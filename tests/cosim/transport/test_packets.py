@@ -40,26 +40,26 @@ class User:
     def __init__(self, *names):
         self.inputs = tuple(InputPort(name) for name in names)
 
-    def bind(self, graph):
+    def bind(self, diagram):
         """Do nothing."""
 
 
-def graph(*names):
-    return graph_of(User(*names), ports=PORTS, page=16)
+def diagram(*names):
+    return graph_of(User(*names), ports=PORTS, kept_ticks=16)
 
 
 def filled(tick):
     """Return a diagram with values of the due ports at `tick`."""
-    result = graph("pair", "slow", "slower")
+    result = diagram("pair", "slow", "slower")
     for port in PORTS:
         if tick % port.period == 0:
-            result.put(port.name, tick, type(port.like)(tick + 0.5, True if port.name == "slow" else -float(tick)))
+            result.put(port.name, tick, type(port.example)(tick + 0.5, True if port.name == "slow" else -float(tick)))
     return result
 
 
 @pytest.mark.parametrize(("tick", "numbers"), [(0, 6), (3, 2), (5, 4), (10, 6)])
 def test_step_packet_holds_due_rows_in_order(tick, numbers):
-    codec, producer, consumer = StepPacketCodec(PORTS), filled(tick), graph("slower", "pair", "slow")
+    codec, producer, consumer = StepPacketCodec(PORTS), filled(tick), diagram("slower", "pair", "slow")
     payload = codec.pack(producer, tick)
     expected = [tick + 0.5, -float(tick), tick + 0.5, 1.0, tick + 0.5, -float(tick)][:numbers]
     assert np.frombuffer(payload, "<f8").tolist() == expected
@@ -70,7 +70,7 @@ def test_step_packet_holds_due_rows_in_order(tick, numbers):
 
 
 def test_diagram_stores_ports_in_use_only():
-    consumer = graph("slow")
+    consumer = diagram("slow")
     StepPacketCodec(PORTS).unpack(StepPacketCodec(PORTS).pack(filled(10), 10), consumer, 10)
     assert consumer.latest("slow", 10) == Single(10.5, True)
     assert not consumer.has("pair")
@@ -84,16 +84,16 @@ def test_service_without_due_port_has_no_packet():
 
 def run_of(ticks):
     """Return a diagram with values of the due ports at each tick in [0, ticks)."""
-    result = graph("pair", "slow", "slower")
+    result = diagram("pair", "slow", "slower")
     for port in PORTS:
         for tick in range(0, ticks, port.period):
-            result.put(port.name, tick, type(port.like)(tick + 0.5, True if port.name == "slow" else -float(tick)))
+            result.put(port.name, tick, type(port.example)(tick + 0.5, True if port.name == "slow" else -float(tick)))
     return result
 
 
 @pytest.mark.parametrize("ticks", [2, 3, 4, 7, 12])
 def test_packet_of_several_ticks_equals_single_packets(ticks):
-    producer, one_by_one, at_once = run_of(15), graph("pair", "slow"), graph("pair", "slow")
+    producer, one_by_one, at_once = run_of(15), diagram("pair", "slow"), diagram("pair", "slow")
     for ports in (PORTS, PORTS[1:]):
         single, several = StepPacketCodec(ports), StepPacketCodec(ports, ticks)
         for first in range(0, 15 - ticks, ticks):
@@ -113,13 +113,13 @@ def test_packet_of_several_ticks_equals_single_packets(ticks):
 @pytest.mark.parametrize("size", [0, 64, 72, 81])
 def test_packet_of_several_ticks_with_wrong_size_is_rejected(size):
     with pytest.raises(PacketError, match=rf"^step packet of {size} bytes at tick 4, expected 80$"):
-        StepPacketCodec(PORTS, 4).unpack(bytes(size), graph("pair", "slow"), 4)
+        StepPacketCodec(PORTS, 4).unpack(bytes(size), diagram("pair", "slow"), 4)
 
 
 @pytest.mark.parametrize("size", [0, 8, 15, 17, 24, 40, 48])
 def test_packet_with_wrong_size_is_rejected(size):
     with pytest.raises(PacketError, match=rf"^step packet of {size} bytes at tick 5, expected 32$"):
-        StepPacketCodec(PORTS).unpack(bytes(size), graph("pair", "slow"), 5)
+        StepPacketCodec(PORTS).unpack(bytes(size), diagram("pair", "slow"), 5)
 
 
 def page(topic, first, n, size, seed=0):

@@ -6,7 +6,7 @@ from itertools import count
 import pytest
 
 from lapwing.cosim.transport.bus import INBOX, ZenohBus
-from lapwing.cosim.transport.ring_subscription import Inbox
+from lapwing.cosim.transport.subscription import Inbox
 from lapwing.messages.attachment import pack
 from tests.endpoints import loopback_endpoints
 

@@ -239,15 +239,9 @@ def test_friction_converges_with_tolerance(drone):
 @pytest.mark.parametrize(
     ("table", "message"),
     [
-        (
-            {"stiffness": -1.0},
-            "effects.ground_contact.stiffness: expected a number above 0 and at most 1e+09",
-        ),
+        ({"stiffness": -1.0}, "effects.ground_contact.stiffness: expected a number above 0 and at most 1e+09"),
         ({"friction": "glue"}, "effects.ground_contact.friction: expected 'stick_slip' or 'regularised', got 'glue'"),
-        (
-            {"friction_dynamic": 0.9},
-            "effects.ground_contact.friction_dynamic: expected at most friction_static = 0.5",
-        ),
+        ({"friction_dynamic": 0.9}, "effects.ground_contact.friction_dynamic: expected at most friction_static = 0.5"),
         ({"stifness": 1e5}, "effects.ground_contact.stifness: unknown key 'stifness'; did you mean stiffness?"),
     ],
 )

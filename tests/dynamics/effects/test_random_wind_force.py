@@ -54,9 +54,10 @@ def test_wind_of_force_is_reported(drone, situation, rotors):
 
 
 @kernel
-def series(e, s, rotors, key, interval, out):
+def series(e, memory, s, rotors, key, interval, out):
     for tick in range(out.shape[0]):
-        force, wind = draw(e, (), s, rotors, key, tick, interval)
+        memory = draw(e, memory, s, rotors, key, tick, interval)
+        force, wind = memory
         out[tick, 0], out[tick, 1] = force[0], wind[0]
 
 
@@ -65,7 +66,7 @@ def test_spectrum_does_not_depend_on_exchange_interval(drone, situation, rotors)
     e, densities, means = make(drone), [], []
     for interval in (0.001, 0.004, 0.01, 0.02):
         out = np.empty((round(800.0 / interval), 2))
-        series(e, situation(), rotors(), KEY, interval, out)
+        series(e, e.initial_discrete_state(), situation(), rotors(), KEY, interval, out)
         frequency, power = welch(out, fs=1 / interval, nperseg=round(4.0 / interval), axis=0)
         densities.append(power[(frequency > 0.5) & (frequency < 10.0)].mean(axis=0) / 2)
         means.append(out[:, 0].mean())
@@ -75,15 +76,17 @@ def test_spectrum_does_not_depend_on_exchange_interval(drone, situation, rotors)
 
 
 def test_short_ticks_share_draws_and_long_ticks_average_them(drone, situation, rotors):
-    e, s = make(drone), situation()
+    e, start = make(drone), make(drone).initial_discrete_state()
 
-    def at(tick, interval):
-        return np.array(draw.py_func(e, e.initial_discrete_state(), s, rotors(), KEY, tick, interval))
+    def at(tick, interval, memory=start, velocity=(0.0, 0.0, 0.0)):
+        return draw.py_func(e, memory, situation(velocity=velocity), rotors(), KEY, tick, interval)
 
-    assert (at(28, 0.001) == at(7, 0.004)).all()
-    assert (at(31, 0.001) == at(7, 0.004)).all()
-    assert (at(32, 0.001) == at(8, 0.004)).all()
-    assert at(1, 0.01) == pytest.approx((at(2, 0.004) / 2 + at(3, 0.004) + at(4, 0.004)) / 2.5)
+    first = at(28, 0.001)
+    assert first == at(7, 0.004)
+    assert first == at(31, 0.001, first, velocity=(2.0, 0.0, 0.0))  # the force of the draw's start
+    assert at(32, 0.001, first) == at(8, 0.004)
+    parts = [np.array(at(tick, 0.004)) for tick in (2, 3, 4)]
+    assert np.array(at(1, 0.01)) == pytest.approx((parts[0] / 2 + parts[1] + parts[2]) / 2.5)
 
 
 def test_drag_is_not_counted_twice(drone):

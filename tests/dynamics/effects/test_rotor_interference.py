@@ -10,8 +10,7 @@ from scipy.optimize import brentq
 
 from lapwing.dynamics import effects
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.effects._vortex_wake import OFFSETS, SKEWS, mean_wash, normal_flow
-from lapwing.dynamics.effects.rotor_interference import rotor_interference
+from lapwing.dynamics.effects.rotor_interference import OFFSETS, SKEWS, mean_wash, normal_flow, rotor_interference
 from lapwing.dynamics.effects.rotor_thrust import rotor_thrust
 
 SPEED, DENSITY = 330.0, 1.2

@@ -11,7 +11,7 @@ from lapwing.dynamics.vector import ZERO
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.multirotor_slung import Sling
-from lapwing.services.common.run_schema import SHIPPED
+from lapwing.services.common.schemas.run_schema import SHIPPED
 from tests.dynamics.vehicles.rebound import rebound
 
 QUAD = load_airframe(SHIPPED / "vehicles/quad_x.toml")

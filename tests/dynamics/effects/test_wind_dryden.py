@@ -7,7 +7,7 @@ import pytest
 from scipy.signal import welch
 
 from lapwing.dynamics import effects
-from lapwing.dynamics.effects._turbulence import deviation_and_rate, intensity
+from lapwing.dynamics.effects._turbulence import deviation_and_rate, intensity, on_line
 from lapwing.dynamics.effects.wind_dryden import draw
 from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.noise import stream_key
@@ -28,7 +28,7 @@ def make(drone, **table):
 def series(e, memory, s, rotors, key, interval, out):
     for tick in range(out.shape[0]):
         memory = draw(e, memory, s, rotors, key, tick, interval)
-        wind = memory[1]
+        wind = memory[1][0]
         out[tick, 0], out[tick, 1], out[tick, 2] = wind[0], wind[1], wind[2]
 
 
@@ -51,7 +51,7 @@ def test_turbulence_follows_height_and_airspeed(drone, situation, rotors, slope,
     s = situation(position=(50.0, 0, 30.0 + 50.0 * slope), velocity=(6.0, 0, 8.0), wind=(0.0, 0.0, 3.0))
     fixed = make(drone, airspeed=math.hypot(6.0, 5.0), altitude=30.0)
     ours, values = (draw(e, e.initial_discrete_state(), s, rotors(), KEY, 0, 0.01) for e in (follows, fixed))
-    assert ours[1] == pytest.approx(values[1], rel=1e-12)
+    assert ours[1][0] == pytest.approx(values[1][0], rel=1e-12)
     low, high, still = (deviation_and_rate(follows.conditions, situation(**where)) for where in (
         {"position": (0, 0, 1.0), "velocity": (5, 0, 0)}, {"position": (0, 0, 2000.0), "velocity": (5, 0, 0)},
         {"position": (0, 0, 20.0)}))  # fmt: skip
@@ -91,8 +91,8 @@ def test_starts_stationary_and_is_exact_at_any_interval(drone, situation, rotors
     for seed in range(1500):
         key = stream_key(seed, "", "effects")
         memory = draw(e, e.initial_discrete_state(), situation(), rotors(), key, 0, 0.004)
-        first.append(memory[1])
-        second.append(draw(e, memory, situation(), rotors(), key, 1, 3.0)[1])
+        first.append(memory[1][0])
+        second.append(on_line(draw(e, memory, situation(), rotors(), key, 1, 3.0)[1], 3.0))
     assert np.std(first, axis=0) == pytest.approx(sigma, rel=0.08)
     assert np.std(second, axis=0) == pytest.approx(sigma, rel=0.08)
     lag = [np.corrcoef(np.array(first)[:, k], np.array(second)[:, k])[0, 1] for k in range(3)]
@@ -102,7 +102,7 @@ def test_starts_stationary_and_is_exact_at_any_interval(drone, situation, rotors
 
 
 def test_heading_turns_axes(drone, situation, rotors):
-    along = draw(make(drone), make(drone).initial_discrete_state(), situation(), rotors(), KEY, 0, 0.01)[1]
+    along = draw(make(drone), make(drone).initial_discrete_state(), situation(), rotors(), KEY, 0, 0.01)[1][0]
     e = make(drone, direction_to=math.pi / 2)
-    turned = draw(e, e.initial_discrete_state(), situation(), rotors(), KEY, 0, 0.01)[1]
+    turned = draw(e, e.initial_discrete_state(), situation(), rotors(), KEY, 0, 0.01)[1][0]
     assert turned == pytest.approx((-along[1], along[0], along[2]))

@@ -10,11 +10,12 @@ from scipy.signal import welch
 from lapwing.dynamics import effects
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects import wind_dryden
-from lapwing.dynamics.effects._turbulence import intensity
+from lapwing.dynamics.effects._turbulence import intensity, on_line
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.effects.axial_inflow import axial_inflow
 from lapwing.dynamics.effects.wind_dryden_rates import add_gust_rate, draw, wind_dryden_rates
 from lapwing.dynamics.noise import stream_key
+from lapwing.dynamics.vector import ZERO
 from lapwing.kernels import kernel
 
 KEY = stream_key(5, "drone1", "effects")
@@ -31,7 +32,7 @@ def make(drone, **table):
 def series(e, memory, s, rotors, key, interval, out):
     for tick in range(out.shape[0]):
         memory = draw(e, memory, s, rotors, key, tick, interval)
-        out[tick, 0], out[tick, 1], out[tick, 2] = memory[3]
+        out[tick, 0], out[tick, 1], out[tick, 2] = memory[4][0]
 
 
 def published(omega):
@@ -70,8 +71,8 @@ def test_standard_deviations_from_first_exchange_on(drone, situation, rotors):
     for seed in range(800):
         key = stream_key(seed, "", "effects")
         memory = draw(e, e.initial_discrete_state(), situation(), rotors(), key, 0, 0.004)
-        first.append(memory[3])
-        second.append(draw(e, memory, situation(), rotors(), key, 1, 2.0)[3])
+        first.append(memory[4][0])
+        second.append(on_line(draw(e, memory, situation(), rotors(), key, 1, 2.0)[4], 2.0))
     assert np.std(first, axis=0) == pytest.approx(expected, rel=0.1)
     assert np.std(second, axis=0) == pytest.approx(expected, rel=0.1)
 
@@ -83,7 +84,7 @@ def test_gusts_equal_wind_dryden_bit_for_bit(drone, situation, rotors):
     for tick in range(20):
         ours = draw(e, ours, situation(), rotors(), KEY, tick, 0.02)
         theirs = wind_dryden.draw(plain, theirs, situation(), rotors(), KEY, tick, 0.02)
-        assert (ours[0][:5], ours[1]) == (theirs[0][0], theirs[1])
+        assert ours[:3] == (theirs[0][0], *theirs[1:])
 
 
 def test_rising_gust_lifts_nose(drone, situation, rotors):
@@ -92,8 +93,8 @@ def test_rising_gust_lifts_nose(drone, situation, rotors):
     memory, rows = e.initial_discrete_state(), []
     for tick in range(3000):
         memory = draw(e, memory, situation(), rotors(), KEY, tick, interval)
-        rows.append((*memory[1], *memory[3]))
-    wind, rate = np.array(rows)[:, :3], np.array(rows)[:, 3:]
+        rows.append((*(on_line(line, interval * tick - memory[2]) for line in (memory[1], memory[4])),))
+    wind, rate = np.array(rows)[:, 0], np.array(rows)[:, 1]
     slow = wind[0].copy()
     for i, gust in enumerate(wind):
         slow += interval / low_pass * (gust - slow)
@@ -115,7 +116,7 @@ def test_air_rotation_acts_on_rotors_like_body_rotation(drone, situation):
 def test_rates_depend_on_vehicle_span(drone, situation):
     (e,) = effects.from_scene({"wind_dryden_rates": {"wind_speed": 7.0}}, drone)
     assert e.span == pytest.approx(2 * 0.4974 + 0.5588)
-    memory = (e.initial_discrete_state()[0], (1.0, 2.0, 3.0), (0.0, 0.0, 0.0), (0.1, 0.2, 0.3))
+    memory = ((0.0,) * 5, ((1.0, 2.0, 3.0), ZERO), 0.0, ZERO, ((0.1, 0.2, 0.3), ZERO))
     s = situation(turn=(0, 0, math.pi / 2))
     assert wind_dryden_rates.py_func(e, memory, s, Air(1.2, (0.0, 0.0, 0.0))).wind_world == (1.0, 2.0, 3.0)
     assert add_gust_rate.py_func(e, memory, s, (1.0, 0.0, 0.0)) == pytest.approx((1.2, -0.1, 0.3))

@@ -19,11 +19,7 @@ def test_delivery_drone_loads():
     ("old", "new", "expected"),
     [
         ("total = 10.0224", "total = -1.0", "mass.total: expected a number above 0 [kg], got -1.0"),
-        (
-            "total = 10.0224",
-            "weight = 1.0",
-            "mass.weight: unknown key 'weight'; expected one of centre, inertia, ",
-        ),
+        ("total = 10.0224", "weight = 1.0", "mass.weight: unknown key 'weight'; expected one of centre, inertia, "),
         ("blades = 2 ", 'blades = "two" ', "propeller.blades"),
         ("[0.27, 0.26, 0.42]", "[0.1, 0.1, 0.42]", "triangle"),
         ("[0.27, 0.26, 0.42]", "[1e-6, 1e-6, 1e-6]", "mass.inertia: expected at least 0.0099 m"),

@@ -14,6 +14,7 @@ from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 from lapwing.studies.accuracy.coordinates import error, of_state
 from lapwing.studies.accuracy.reference import attitude_rate
 from lapwing.studies.accuracy.systems.multirotor import START
+from tests.combinations import rest_nightly
 
 DRONE = load_airframe(Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml")
 TICK, TOLERANCE = 0.004, 1e-9
@@ -78,7 +79,7 @@ def reference(p):
 
 @pytest.mark.long
 @pytest.mark.parametrize("wind", [(0.5, -0.3, -5.5), (0.5, -0.3, 4.0)], ids=["from above", "from below"])
-@pytest.mark.parametrize(("integrator", "steps"), [("rk4_renormalised", 4), ("rk8_renormalised", 1)])
+@pytest.mark.parametrize(("integrator", "steps"), rest_nightly(("rk4_renormalised", 4), ("rk8_renormalised", 1)))
 def test_crossing_of_limit_is_as_accurate_as_tolerance(integrator, steps, wind):
     p = plant(wind)
     exact, crossings = reference(p)

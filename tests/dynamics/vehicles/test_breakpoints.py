@@ -16,6 +16,7 @@ from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, Mul
 from lapwing.studies.accuracy.coordinates import error, of_state
 from lapwing.studies.accuracy.reference import dop853
 from lapwing.studies.accuracy.systems.multirotor import START, VOLTAGE, right_hand_side
+from tests.combinations import rest_nightly
 
 pytestmark = pytest.mark.long
 
@@ -58,7 +59,9 @@ def broken_by_reference(p):
     return y
 
 
-@pytest.mark.parametrize(("integrator", "bound"), [("rk4_renormalised", 1e-10), ("rk8_renormalised", 1e-12)])
+@pytest.mark.parametrize(
+    ("integrator", "bound"), rest_nightly(("rk4_renormalised", 1e-10), ("rk8_renormalised", 1e-12))
+)
 def test_faults_between_ticks_are_exact(integrator, bound):
     p, motion = fly(BROKEN, START, integrator=integrator)
     assert error(of_state(motion), broken_by_reference(p)) < bound

@@ -13,7 +13,7 @@ from lapwing.dynamics.noise import stream_key
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import Airframe, load_airframe
 from lapwing.dynamics.vehicles.airframe_tables import Mass
-from lapwing.services.common.run_schema import SHIPPED
+from lapwing.services.common.schemas.run_schema import SHIPPED
 
 DRONE = load_airframe(SHIPPED / "vehicles/delivery_drone.toml")
 RK4 = get("rk4_renormalised").Method()

@@ -16,6 +16,7 @@ from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive
 from lapwing.dynamics.vehicles.multirotor_multibody_equations import joints
 from lapwing.kernels import kernel
+from tests.combinations import rest_nightly
 
 DRONE = load_airframe(Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml")
 RK4 = get("rk4_renormalised").Method()
@@ -62,7 +63,7 @@ def reference():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("stabilisation", ["projection", "partitioning", "baumgarte", "none"])
+@pytest.mark.parametrize("stabilisation", rest_nightly("projection", "partitioning", "baumgarte", "none"))
 def test_symmetric_propellers_at_imposed_speed_equal_reduced_model(reference, stabilisation):
     p = multirotor_multibody.parameters(SYMMETRIC, ACTIVE, "speed", stabilisation)
     start = multirotor_multibody.initial_state(p, (0.0, 0.0, 10.0), ATTITUDE, SPEED, omega_body=OMEGA)

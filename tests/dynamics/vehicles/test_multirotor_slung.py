@@ -16,7 +16,7 @@ from lapwing.dynamics.terrain import LEVEL
 from lapwing.dynamics.vehicles import multirotor_slung as slung
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.kernels import python_function
-from lapwing.services.common.run_schema import SHIPPED
+from lapwing.services.common.schemas.run_schema import SHIPPED
 from lapwing.services.scene_resolver import load
 from tests.dynamics.vehicles.rebound import rebound
 

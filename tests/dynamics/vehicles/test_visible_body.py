@@ -10,7 +10,7 @@ from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.airframe_tables import CarriedBox
 from lapwing.dynamics.vehicles.visible_body import HALF_HEIGHT, VisibleBody, distance_to_body, visible_body
-from lapwing.services.common.run_schema import SHIPPED
+from lapwing.services.common.schemas.run_schema import SHIPPED
 
 pytestmark = pytest.mark.usefixtures("uncompiled")
 

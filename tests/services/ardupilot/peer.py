@@ -19,7 +19,7 @@ def servo_packet(count, pwm=(1000,) * 16, magic=18458, rate=1200):
 
 
 def read_state(data):
-    """Return the required fields by key.
+    """Return the required fields by key, and voltage and current of the battery if it has them.
 
     Raises:
         ValueError: ArduPilot would not read the message.
@@ -38,6 +38,8 @@ def read_state(data):
         if not match:
             raise ValueError(f"{key} is not read: {rest[:20]!r}")
         result[key] = [float(v) for v in match.group(match.lastindex or 0).split(",")]
+    battery = re.search(rf'"battery":{{"voltage":({NUMBER}),"current":({NUMBER})}}', text)
+    result["battery"] = [float(v) for v in battery.groups()] if battery else []
     return result
 
 

@@ -8,17 +8,17 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from lapwing.kernels import kernel
-from lapwing.services.ardupilot.decimal_text import LIMIT, write_number
+from lapwing.services.ardupilot.state_message import LIMIT, write_number
 
 
 @kernel
-def write(out, value, decimals, scale):
-    return write_number(out, 0, value, decimals, scale)
+def write(out, value, decimals):
+    return write_number(out, 0, value, decimals)
 
 
 def text(value, decimals=9):
     out = np.zeros(40, np.uint8)
-    return out[: write(out, value, decimals, 10**decimals)].tobytes().decode()
+    return out[: write(out, value, decimals)].tobytes().decode()
 
 
 @pytest.mark.parametrize(

@@ -1,50 +1,87 @@
-"""Complete runs with ArduPilot as the autopilot: a scripted program, or the real one (LAPWING_ARDUCOPTER)."""
+"""Complete runs with ArduPilot as the autopilot: a scripted program, or the real one (ARDUCOPTER)."""
 
 import json
 import os
 import socket
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 
 from lapwing.cosim.log import LogReader
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.services.ardupilot.link import MAVLINK_PORT, PORT, STRIDE
+from lapwing.runs.resimulate import recorded_config
+from lapwing.services.ardupilot.link import MAVLINK_PORT, STRIDE
 from lapwing.services.scene_resolver import load, resolve
-from tests.services.firmware_links import free_instance
-
-PEER = Path(__file__).parent / "scripted_ardupilot.py"
+from tests.services.firmware_links import fly, lapwing, program, scripted
 
 
-def run(command, *options, timeout=900):
-    """Run the scene with a program as ArduPilot."""
-    instance = free_instance((socket.SOCK_DGRAM, PORT, STRIDE), (socket.SOCK_STREAM, MAVLINK_PORT, STRIDE))
-    arguments = [sys.executable, "-m", "lapwing", "run", "ardupilot_quad", "--mode", "single-process"]
-    arguments += ["--set", f"autopilot.command={json.dumps(command)}", "--set", f"autopilot.instance={instance}"]
-    return subprocess.run([*arguments, *options], capture_output=True, text=True, timeout=timeout)
+def run(folder, *options, seconds=15.0, settings=(), code=None):
+    """Fly with the scripted program."""
+    log, duration = folder / "flight.mcap", f"run.duration={seconds}"
+    return fly("ardupilot", scripted("ardupilot", *options), "--log", log, "--set", duration, *settings, code=code)
 
 
 @pytest.mark.long
 def test_scripted_firmware_flies_and_resimulates(tmp_path):
-    log = tmp_path / "flight.mcap"
-    result = run([sys.executable, str(PEER)], "--log", str(log), "--set", "run.duration=15.0")
-    assert "leaves the ground" in result.stdout, result.stdout + result.stderr
-    with LogReader(log) as reader:
-        report = reader.metadata["firmware"]
+    assert "leaves the ground" in run(tmp_path, settings=("--firmware-schedule", "3")).stdout
+    with LogReader(tmp_path / "flight.mcap") as reader:
+        report, repeatable = reader.metadata["firmware"], reader.metadata["repeatable"]
+        assert recorded_config(reader).services["ardupilot"].parameters.schedule == 3
+    assert repeatable == "yes"
     assert "skew 0 ms, resent 0, late 0, missed 0, rejected 0, reconnected 0" in report
-    again = subprocess.run([sys.executable, "-m", "lapwing", "resimulate", str(log)], capture_output=True, text=True)
-    assert again.returncode == 0, again.stdout + again.stderr
+    lapwing("resimulate", tmp_path / "flight.mcap")
 
 
 @pytest.mark.long
-def test_program_end_in_flight_is_reported(tmp_path):
-    result = run([sys.executable, str(PEER), "--die"], "--log", str(tmp_path / "flight.mcap"))
-    assert result.returncode != 0
+def test_flight_with_stopped_firmware_is_the_same(tmp_path):
+    """A debugger stops ArduPilot for longer than the time-out."""
+    timeout = "--set", "autopilot.step_timeout=1.0"
+    outputs = [run(tmp_path, *options, seconds=5.0, settings=timeout).stdout for options in ([], ["--stop"])]
+    first, second = (next(line for line in text.splitlines() if line.startswith("digest")) for text in outputs)
+    assert first == second
+
+
+@pytest.mark.long
+def test_program_end_in_flight_is_reported_with_its_output(tmp_path):
+    result = run(tmp_path, "--die", settings=("--set", "autopilot.repeatable=false"), code=1)
+    with LogReader(tmp_path / "flight.mcap") as reader:
+        assert reader.metadata["repeatable"] == "no: autopilot.repeatable = false"
     assert "ardupilot: the program ended (exit code 1) at t = 4.00" in result.stderr
-    assert "crashed on purpose" in result.stderr
-    assert "Traceback" not in result.stderr
+    assert "its last output: crashed on purpose" in result.stderr
+    assert "crashed on purpose" in (tmp_path / "flight.ardupilot.txt").read_text()
+    assert (tmp_path / "flight.ardupilot.bin").read_text().startswith("FMT")
+
+
+@pytest.mark.long
+def test_own_log_of_firmware_agrees_with_scene(tmp_path):
+    """The motor commands in the firmware's log produce the measured force, also without a measured voltage."""
+    run(tmp_path, seconds=9.0)
+    lines = (tmp_path / "flight.ardupilot.bin").read_text().splitlines(keepends=True)
+    for kept in ("", "BAT"):
+        log, result = tmp_path / f"without{kept}.log", tmp_path / f"without{kept}.json"
+        log.write_text("".join(line for line in lines if not kept or kept not in line))
+        lapwing("validate", "ardupilot_quad", log, "--json", result)
+        (flight,) = json.loads(result.read_text())["flights"].values()
+        assert flight["thrust_ratio"] == pytest.approx(1.0, abs=0.02)
+
+
+@pytest.mark.long
+def test_campaign_with_two_workers_finds_free_ports_and_leaves_no_files(tmp_path):
+    """A program keeps its ports for a while after the request to end, and another simulator has those of instance 1."""
+    temporary, starts = tmp_path / "tmp", tmp_path / "starts.txt"
+    temporary.mkdir()
+    with socket.create_server(("127.0.0.1", MAVLINK_PORT + STRIDE)):
+        lapwing(
+            "campaign", "ardupilot_quad", "--runs", 6, "--out", tmp_path / "campaign", "--workers", 2,
+            "--set", "run.duration=2.0", "--set", "effects.body_drag.linear=[0,0,0]",
+            "--vary", "effects.body_drag.linear.0=uniform(0,0.01)",
+            *program(scripted("ardupilot", "--slow-exit", 0.5, "--starts", starts)),
+            env={**os.environ, "TMPDIR": str(temporary)},
+        )  # fmt: skip
+    started = [tuple(map(int, line.split())) for line in starts.read_text().splitlines()]
+    assert len(started) == 6
+    assert 1 not in {instance for instance, _ in started}
+    assert list(temporary.glob("lapwing_*")) == []
 
 
 def test_slow_exchange_is_rejected():
@@ -64,11 +101,9 @@ def test_mission_is_part_of_configuration():
 
 
 @pytest.mark.long
-@pytest.mark.skipif("LAPWING_ARDUCOPTER" not in os.environ, reason="LAPWING_ARDUCOPTER names no arducopter program")
+@pytest.mark.skipif("ARDUCOPTER" not in os.environ, reason="ARDUCOPTER names no arducopter program")
 def test_arducopter_flies_its_square(tmp_path):
-    log, binary = tmp_path / "flight.mcap", Path(os.environ["LAPWING_ARDUCOPTER"]).resolve()
-    result = run([str(binary)], "--log", str(log))
-    assert result.returncode == 0, result.stdout + result.stderr
-    assert "Landed" in result.stdout
+    log, binary = tmp_path / "flight.mcap", Path(os.environ["ARDUCOPTER"]).resolve()
+    assert "Landed" in fly("ardupilot", [binary], "--log", log).stdout
     with LogReader(log) as reader:
         assert "skew 0 ms" in reader.metadata["firmware"]

@@ -6,16 +6,16 @@ import time
 
 import pytest
 
-from lapwing.services.ardupilot.link import MAVLINK_PORT, PEER_TIMEOUT, PORT, STRIDE, ArduPilotLink
-from lapwing.services.ardupilot.resolve import ArduPilotSetup
+from lapwing.services.ardupilot.link import MAVLINK_PORT, PEER_TIMEOUT, STRIDE, ArduPilotLink
+from lapwing.services.ardupilot.resolve import ArduPilotConfig
 from lapwing.services.common import ports
-from lapwing.services.common.firmware.link import FirmwareError
+from lapwing.services.common.firmware.program import FirmwareError
 from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.common.ports import BatteryReading, TrueState
 from tests.services.ardupilot.peer import ArduPilotPeer, servo_packet
-from tests.services.firmware_links import Background, Exchange, firmware_setup, free_instance, never
+from tests.services.firmware_links import Background, link_with, never
 
-OWN = ArduPilotSetup(Datum(), (0.0, 0.0, -9.80665), 250.0, False, "", False, False)
+OWN = ArduPilotConfig(Datum(), (0.0, 0.0, -9.80665), 250.0, False, "", False, False, {})
 
 
 SAMPLES = {ports.TRUTH: TrueState(position_world=(1.0, 2.0, 3.0)), ports.BATTERY: BatteryReading(1.0, 11.1, 2.0)}
@@ -23,9 +23,7 @@ SAMPLES = {ports.TRUTH: TrueState(position_world=(1.0, 2.0, 3.0)), ports.BATTERY
 
 @pytest.fixture
 def link():
-    instance = free_instance((socket.SOCK_DGRAM, PORT, STRIDE), (socket.SOCK_STREAM, MAVLINK_PORT, STRIDE))
-    link = ArduPilotLink(firmware_setup("ardupilot", OWN, instance))
-    link.steps = Exchange(link, SAMPLES)
+    link = link_with(ArduPilotLink, OWN, SAMPLES)
     yield link
     link.close()
 
@@ -42,16 +40,21 @@ def begin(link, script):
     return background
 
 
+def flight(link, script, steps):
+    """Run a script with a peer during `steps`, answer its last frame. Return the outputs, and the script's result."""
+    background = begin(link, script)
+    outputs = fly(link, steps)
+    link._send()
+    return outputs, background.join()
+
+
 @pytest.mark.long
 def test_every_step_is_answered(link):
     def script(peer):
         return [peer.exchange((1000 + k,) * 4 + (0,) * 12) for k in range(101)]
 
-    background = begin(link, script)
-    outputs = fly(link, 100)
-    link._send()  # answers the last frame
-    states = background.join()
-    assert [s["timestamp"][0] for s in states[:100]] == pytest.approx([0.004 * k for k in range(100)], abs=1e-6)
+    outputs, states = flight(link, script, 100)
+    assert [s["timestamp"][0] for s in states[:100]] == pytest.approx([0.004 * k for k in range(1, 101)], abs=1e-6)
     assert states[0]["position"] == [2.0, 1.0, -3.0]
     assert states[0]["accel_body"] == pytest.approx([0.0, 0.0, -9.80665])
     assert [o.outputs[0] for o in outputs] == pytest.approx([1e-3 * k for k in range(1, 101)])
@@ -68,10 +71,8 @@ def test_clock_of_whole_microseconds_does_not_drift(link):
             clock, last = int(clock + (time_s - last) * 1e6), time_s
         return clock
 
-    background = begin(link, script)
-    fly(link, 2000)
-    link._send()
-    assert background.join() in (1999 * 4000, 2000 * 4000)
+    _, result = flight(link, script, 2000)
+    assert result == 2000 * 4000
 
 
 def test_resent_frame_is_answered_without_step(link):
@@ -85,10 +86,7 @@ def test_resent_frame_is_answered_without_step(link):
         peer.exchange()
         return states
 
-    background = begin(link, script)
-    fly(link, 2)
-    link._send()
-    states = background.join()
+    _, states = flight(link, script, 2)
     assert len(set(states)) <= 2
     assert link.report.resent == 2
 
@@ -102,10 +100,8 @@ def test_frame_resent_before_answer_does_not_delay_later_steps(link):
             peer.send(servo_packet(1))
         return [peer.exchange()["timestamp"][0] for _ in range(5)]
 
-    background = begin(link, script)
-    fly(link, 5)
-    link._send()
-    assert background.join() == pytest.approx([0.004 * k for k in (1, 2, 3, 4, 4)], abs=1e-6)
+    _, result = flight(link, script, 5)
+    assert result == pytest.approx([0.004 * k for k in (2, 3, 4, 5, 5)], abs=1e-6)
     assert link.report.resent == 2
 
 
@@ -117,10 +113,7 @@ def test_malformed_packets_are_counted_and_reported(link):
         peer.exchange()
         peer.exchange()
 
-    background = begin(link, script)
-    fly(link, 2)
-    link._send()
-    background.join()
+    flight(link, script, 2)
     assert link.report.rejected == 4
     assert "magic number 1, expected 18458 or 29569" in " ".join(link.report.notes)
 
@@ -133,10 +126,7 @@ def test_restart_with_same_address_is_counted(link):
         for _ in range(5):
             peer.exchange()
 
-    background = begin(link, script)
-    fly(link, 9)
-    link._send()
-    background.join()
+    flight(link, script, 9)
     assert link.report.reconnected == 1
 
 
@@ -150,10 +140,8 @@ def test_second_firmware_is_rejected_while_first_runs(link):
         peer.exchange()
         return other.receive(0.1)
 
-    background = begin(link, script)
-    fly(link, 2)
-    link._send()
-    assert background.join() is None
+    _, result = flight(link, script, 2)
+    assert result is None
     assert link.report.rejected == 1
     assert "another ArduPilot" in link.report.notes[0]
 
@@ -167,12 +155,9 @@ def test_restarted_firmware_with_new_address_takes_over(link):
         other = ArduPilotPeer(link.address[1])
         return [other.exchange() for _ in range(3)]
 
-    background = begin(link, script)
-    fly(link, 4)
-    link._send()
-    states = background.join()
+    _, states = flight(link, script, 4)
     assert link.report.reconnected == 1
-    assert states[0]["timestamp"][0] >= 0.004 - 1e-6  # the plant continues from its state
+    assert states[0]["timestamp"][0] >= 0.008 - 1e-6  # the plant continues from its state
 
 
 def test_mavlink_client_connects_to_restarted_firmware(link):
@@ -182,31 +167,31 @@ def test_mavlink_client_connects_to_restarted_firmware(link):
         peer.exchange()
         peer.exchange()
         peer.close()
-        with socket.create_server(("127.0.0.1", MAVLINK_PORT + STRIDE * link._setup.instance)) as server:
+        with socket.create_server(("127.0.0.1", MAVLINK_PORT + STRIDE * link._config.instance)) as server:
             server.settimeout(20.0)
             with server.accept()[0]:
                 other = ArduPilotPeer(link.address[1])
                 return [other.exchange() for _ in range(3)]
 
-    link._setup = link._setup._replace(step_timeout=15.0)
-    background = begin(link, script)
-    fly(link, 4)
-    link._send()
-    background.join()
+    link._config = link._config._replace(step_timeout=15.0)
+    flight(link, script, 4)
     assert link.report.reconnected == 1
 
 
 def test_stall_is_reported(link):
-    link._setup = link._setup._replace(step_timeout=0.5)
+    link._config = link._config._replace(step_timeout=0.5)
     background = begin(link, lambda peer: peer.exchange())
-    with pytest.raises(FirmwareError, match=r"ardupilot: no servo packet for 0.5 s at t = 0.00[04] s"):
+    with pytest.raises(
+        FirmwareError,
+        match=r"ardupilot: no servo packet for 0.5 s at t = 0.00[04] s; .*, or raise autopilot.step_timeout",
+    ):
         fly(link, 3)
     background.join()
 
 
 def test_absent_firmware_is_reported(link):
-    link._setup = link._setup._replace(start_timeout=0.5)
-    with pytest.raises(FirmwareError, match=r"no servo packet for 0.5 s at t = 0.000 s; start arducopter"):
+    link._config = link._config._replace(start_timeout=0.5)
+    with pytest.raises(FirmwareError, match=r"no servo packet for 0.5 s at its start; start arducopter"):
         link.open(never)
 
 
@@ -215,7 +200,7 @@ def test_mavlink_port_is_tried_until_it_listens(link):
 
     def script(peer):
         time.sleep(1.0)
-        with socket.create_server(("127.0.0.1", MAVLINK_PORT + STRIDE * link._setup.instance)) as server:
+        with socket.create_server(("127.0.0.1", MAVLINK_PORT + STRIDE * link._config.instance)) as server:
             server.settimeout(20.0)
             server.accept()[0].close()
         return peer.exchange()

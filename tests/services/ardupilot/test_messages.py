@@ -8,8 +8,7 @@ import numpy as np
 import pytest
 
 from lapwing.kernels import kernel
-from lapwing.services.ardupilot.frame_sequence import Frame, FrameSequence
-from lapwing.services.ardupilot.servo_packet import decode, throttle
+from lapwing.services.ardupilot.servo_packet import ANY, RESENT, RESTARTED, decode, frames_ahead, throttle
 from lapwing.services.ardupilot.state_message import INVALID, Extras, VehicleState, write_state
 
 pytestmark = pytest.mark.usefixtures("uncompiled")
@@ -78,20 +77,15 @@ def test_malformed_servo_packet_is_rejected(data, message):
 
 
 def test_throttle_is_limited():
-    assert [throttle(pwm, 1000.0, 2000.0) for pwm in (0, 1000, 1250, 2000, 2100)] == [0.0, 0.0, 0.25, 1.0, 1.0]
+    assert [throttle(pwm) for pwm in (0, 1000, 1250, 2000, 2100)] == [0.0, 0.0, 0.25, 1.0, 1.0]
 
 
-def test_frame_sequence():
-    sequence = FrameSequence()
-    counts = (5, 6, 6, 9, 0, 1)
-    expected = [Frame.NEW, Frame.NEW, Frame.RESENT, Frame.NEW, Frame.RESTARTED, Frame.NEW]
-    assert [sequence.receive(count) for count in counts] == expected
-    assert (sequence.resent, sequence.skipped, sequence.restarts) == (1, 2, 1)
-
-
-def test_frame_sequence_wraps():
-    sequence = FrameSequence()
-    assert [sequence.receive(count) for count in (0xFFFFFFFF, 0)] == [Frame.NEW, Frame.NEW]
+@pytest.mark.parametrize(
+    ("count", "expected", "ahead"),
+    [(5, ANY, 0), (6, 6, 0), (6, 7, RESENT), (9, 7, 2), (0, 10, RESTARTED), (0xFFFFFFFF, ANY, 0), (0, 0x100000000, 0)],
+)
+def test_frames_ahead(count, expected, ahead):
+    assert frames_ahead(count, expected) == ahead
 
 
 def test_level_at_rest_has_negative_acceleration_in_frd():

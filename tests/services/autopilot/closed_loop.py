@@ -8,10 +8,16 @@ import numpy as np
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion, normalise, retract, rotate, to_roll_pitch_yaw
 from lapwing.dynamics.vector import ZERO, Vec3, add, cross, divide, multiply, norm, scale, subtract
 from lapwing.kernels import kernel
-from lapwing.services.autopilot.attitude import wrap
-from lapwing.services.autopilot.control import START, step
+from lapwing.services.autopilot.control import START, step, wrap
 from lapwing.services.autopilot.controller_parameters import Airframe
-from lapwing.services.autopilot.land_detector import LANDED
+from lapwing.services.autopilot.land_detector import (
+    FLYING,
+    INITIAL_LANDED_STATE,
+    LANDED,
+    Parameters,
+    Thresholds,
+    update_landed_state,
+)
 from lapwing.services.autopilot.motor import RPM, Motor
 from lapwing.services.common.ports import PerRotor, StateEstimate
 from lapwing.services.trajectory.phases import Phases
@@ -31,8 +37,12 @@ AIRFRAME = Airframe(
     voltage_max=44.4,
     resting_height=0.35,
 )
+DETECTOR = Parameters(
+    Thresholds(cut_height=0.05), AIRFRAME.resting_height, AIRFRAME.mass * AIRFRAME.gravity, AIRFRAME.gravity, 0.0, 0.0
+)
 TICK, SUBSTEPS = 0.004, 4
 WIND_MEAN, WIND_SIGMA, WIND_TIME = (3.0, 1.0, 0.0), 1.0, 0.5  # [m/s], [m/s], [s]
+OFF = (0.0, 0.0, 0.0, 0.0)  # [V]
 WIND_AREA = 0.5 * 0.06 * 1.22  # half C_s S rho [kg/m]
 
 
@@ -87,11 +97,7 @@ def move(plant, b, speed_command, wind_world, h):
     s0, s1, s2, s3 = s0 + k * (u0 - s0), s1 + k * (u1 - s1), s2 + k * (u2 - s2), s3 + k * (u3 - s3)
     c = plant.thrust_coefficient
     f0, f1, f2, f3 = c * s0 * s0, c * s1 * s1, c * s2 * s2, c * s3 * s3
-    torque = (
-        ARM * (f0 + f1 - f2 - f3),
-        ARM * (-f0 + f1 + f2 - f3),
-        plant.torque_per_thrust * (f0 - f1 + f2 - f3),
-    )
+    torque = (ARM * (f0 + f1 - f2 - f3), ARM * (-f0 + f1 + f2 - f3), plant.torque_per_thrust * (f0 - f1 + f2 - f3))
     turn = divide(subtract(torque, cross(b.omega_body, multiply(plant.inertia, b.omega_body))), plant.inertia)
     air = subtract(wind_world, b.velocity_world)
     force = add(rotate(b.attitude, (0.0, 0.0, f0 + f1 + f2 + f3)), scale(WIND_AREA * norm(air), air))
@@ -117,7 +123,7 @@ def fly(p, trajectory, plant, white, noise):
     the estimate. Columns: time, position, roll, pitch, yaw, references of these six, largest thrust, landed state.
     """
     b = Body((0.0, 0.0, AIRFRAME.resting_height), NO_ROTATION, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 0.0))
-    s = START
+    s, landed = START, INITIAL_LANDED_STATE
     log = np.zeros((len(white), 15))
     gust = (0.0, 0.0, 0.0)
     a = math.exp(-TICK / WIND_TIME)
@@ -134,15 +140,16 @@ def fly(p, trajectory, plant, white, noise):
             add(b.omega_body, (noise[3] * e[12], noise[3] * e[13], noise[3] * e[14])),
             ZERO, ZERO, ZERO, ZERO, ZERO, ZERO, 0, 0,
         )  # fmt: skip
-        s, u = step(p, s, TICK, estimate, setpoint, 0)
+        landed = update_landed_state(DETECTOR, landed, estimate, setpoint, 0.0, TICK)
+        s, u = step(p, s if landed.name == FLYING else START, TICK, estimate, setpoint, 0)
         angles = to_roll_pitch_yaw(b.attitude)
         for k in range(3):
             log[i, 1 + k] = b.position_world[k]
             log[i, 4 + k] = angles[k]
             log[i, 7 + k] = setpoint.position_world[k]
         log[i, 0], log[i, 10], log[i, 11], log[i, 12] = i * TICK, u.roll_reference, u.pitch_reference, u.yaw_reference
-        log[i, 13], log[i, 14] = max(max(u.thrust[0], u.thrust[1]), max(u.thrust[2], u.thrust[3])), s.landed_state.name
-        volts = u.motor_voltage
+        log[i, 13], log[i, 14] = max(max(u.thrust[0], u.thrust[1]), max(u.thrust[2], u.thrust[3])), landed.name
+        volts = u.motor_voltage if landed.name == FLYING else OFF
         k = MOTOR.speed_constant * MOTOR.gear_ratio / RPM
         new = (k * volts[0], k * volts[1], k * volts[2], k * volts[3])
         applied = old if plant.delay == 1 else new
@@ -153,7 +160,7 @@ def fly(p, trajectory, plant, white, noise):
 
 
 NOMINAL = Plant(AIRFRAME.mass, AIRFRAME.inertia_body, AIRFRAME.torque_per_thrust, MOTOR.thrust_coefficient, 0)
-TRUTH = (0.0, 0.0, 0.0, 0.0)
+TRUTH = OFF
 
 
 def mission(parameters, plant=NOMINAL, seed=1, noise=TRUTH, spec=MISSION):

@@ -47,7 +47,7 @@ class Flight(Session):
         self.commander.state.guidance.parameters |= dict(parameters)
         self.setpoint = Setpoint((0.0, 0.0, 0.35), (0.0,) * 3, (0.0,) * 3, 0.0, 0.0)
         self.track, self.statuses = [], []
-        self.time = 0.0
+        self.time, self.wall = 0.0, math.inf  # [s], [m] largest x
         self.send(*commands)
 
     def send(self, *commands):
@@ -57,9 +57,10 @@ class Flight(Session):
 
     def _advance(self, commands=()):
         x, y, z = self.setpoint.position_world
+        vx, vy, vz = self.setpoint.velocity_world
         estimate = StateEstimate(
-            position_world=(x, y, max(z, 0.35)),
-            velocity_world=self.setpoint.velocity_world,
+            position_world=(min(x, self.wall), y, max(z, 0.35)),
+            velocity_world=(vx if x < self.wall else 0.0, vy, vz),
             attitude=from_roll_pitch_yaw(0.0, 0.0, self.setpoint.yaw),
         )
         down = self.setpoint.velocity_world[2] < 0.0 and z <= 0.36

@@ -42,11 +42,7 @@ def bump(amplitude, frequency, t):
 def attitude_at(t, agility):
     """Return the attitude with body z along the thrust of the path and a smooth yaw."""
     tau = max(t - STAND, 0.0)
-    ax, ay, az = (
-        bump(1.2, 0.8 * agility, tau)[2],
-        bump(0.9, 0.7 * agility, tau)[2],
-        bump(2.4, 0.35 * agility, tau)[2],
-    )
+    ax, ay, az = (bump(1.2, 0.8 * agility, tau)[2], bump(0.9, 0.7 * agility, tau)[2], bump(2.4, 0.35 * agility, tau)[2])
     f = (ax, ay, az + 9.81)
     up = scale(1.0 / norm(f), f)
     yaw = bump(0.5, 0.3, tau)[0]

@@ -10,14 +10,12 @@ from hypothesis import strategies as st
 from scipy.optimize import linprog
 from test_allocation import ROTORS
 from test_mixer import SHARES, wrench
-from test_px4_cascade import parameters as px4
 
 from lapwing.dynamics.lie.quaternion import from_roll_pitch_yaw
 from lapwing.dynamics.vector import ZERO
 from lapwing.services.autopilot import control
 from lapwing.services.autopilot.allocation import tables
 from lapwing.services.autopilot.commander_block import controller
-from lapwing.services.autopilot.land_detector import FLYING
 from lapwing.services.autopilot.mixer import (
     AIRMODE_DISABLED,
     AIRMODE_ROLL_PITCH,
@@ -27,7 +25,6 @@ from lapwing.services.autopilot.mixer import (
     mix,
     saturate,
 )
-from lapwing.services.autopilot.px4 import law
 from lapwing.services.common.autopilot_parameters import table
 from lapwing.services.common.ports import Setpoint, StateEstimate
 from lapwing.services.scene_resolver import load, resolve
@@ -139,29 +136,16 @@ def test_cascaded_pid_raises_lift_for_roll_unless_disabled(roll):
     values = {p.name: p.default for p in table(scene).values()}
     config = resolve(scene).services["autopilot"].parameters
     estimate, setpoint = tumbling(roll)
-    flying = control.START._replace(landed_state=control.START.landed_state._replace(name=FLYING))
 
     def thrusts(mode):
         law = controller(config, values | {"MC_AIRMODE": mode})
-        return control.step(law, flying, 0.004, estimate, setpoint, 0)[1].thrust
+        return control.step(law, control.START, 0.004, estimate, setpoint, 0)[1].thrust
 
     assert thrusts(0.0) == pytest.approx([0.0] * 4, abs=1e-9)
     force, torque = wrench(thrusts(1.0))
     assert force[2] > 1.0
     assert torque[0] * roll < 0.0
     assert thrusts(2.0) == pytest.approx(thrusts(1.0))  # no yaw is desired
-
-
-def test_px4_cascade_has_same_airmodes():
-    estimate, setpoint = tumbling(0.5)
-
-    def signals(mode):
-        volts = law.step(px4(MC_AIRMODE=mode), law.START, 0.004, estimate, setpoint, 0)[1].motor_voltage
-        return np.array(volts) / px4().voltage_max
-
-    collective = px4().position.thrust_min
-    assert np.mean(signals(0.0)) == pytest.approx(collective)
-    assert np.mean(signals(1.0)) > 1.5 * collective
 
 
 @pytest.mark.long

@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from lapwing.dynamics.lie.quaternion import from_roll_pitch_yaw, retract, to_roll_pitch_yaw
 from lapwing.dynamics.vector import scale, subtract
-from lapwing.services.autopilot.attitude import angle_rates, body_rates, error_by_angle, error_on_so3, wrap
+from lapwing.services.autopilot.control import angle_rates, body_rates, error_by_angle, error_on_so3, wrap
 
 TILT = st.floats(-1.2, 1.2)
 RATES = st.tuples(*[st.floats(-3.0, 3.0)] * 3)

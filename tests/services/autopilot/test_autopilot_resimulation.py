@@ -7,16 +7,16 @@ from flights import OPERATED, UP, command, scripted
 
 from lapwing.cosim.config.serialise import first_difference
 from lapwing.cosim.log import LogReader
-from lapwing.runs.resimulate import recorded_setup, resimulate
+from lapwing.runs.resimulate import recorded_config, resimulate
 from lapwing.runs.single_process_run import fly_single
 from lapwing.services.scene_resolver import load, resolve
 
 SCENES = Path(__file__).parents[3] / "lapwing/scenes"
 
 
-def fly(log, setup, operator=None, sources=None):
+def fly(log, config, operator=None, sources=None):
     """Record a flight in a log. Return its digest."""
-    fly_single(setup, log, sources, operator=operator)
+    fly_single(config, log, sources, operator=operator)
     with LogReader(log) as read:
         return read.digest()
 
@@ -30,8 +30,8 @@ def test_resimulated_commands_keep_their_ticks(tmp_path):
 
 def test_commands_of_plan_are_executed_once(tmp_path):
     log = tmp_path / "plan.mcap"
-    setup = resolve(load("hover", [*OPERATED, "run.duration=4"]), {"drone1": tuple(UP[0.04])})
-    digest = fly(log, setup)
+    config = resolve(load("hover", [*OPERATED, "run.duration=4"]), {"drone1": tuple(UP[0.04])})
+    digest = fly(log, config)
     assert resimulate(log) == (digest, digest)
 
 
@@ -45,9 +45,9 @@ def test_log_resimulates_without_scene_files(tmp_path):
     copy = shutil.copytree(SCENES, tmp_path / "scenes")
     scene = load(copy / "hover.toml", ["run.duration=2", "airframe.mass.total=9.5", "gains.tilt_limit=0.5"])
     shutil.rmtree(copy)
-    log, setup = tmp_path / "hover.mcap", resolve(scene)
-    digest = fly(log, setup, sources={name: content.decode() for name, content in scene.sources.items()})
+    log, config = tmp_path / "hover.mcap", resolve(scene)
+    digest = fly(log, config, sources={name: content.decode() for name, content in scene.sources.items()})
     assert resimulate(log) == (digest, digest)
     with LogReader(log) as read:
-        assert first_difference(recorded_setup(read), setup) is None
+        assert first_difference(recorded_config(read), config) is None
         assert read.attachments["airframe.toml"] == (SCENES / "vehicles" / "delivery_drone.toml").read_bytes()

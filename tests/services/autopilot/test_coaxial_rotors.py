@@ -14,9 +14,9 @@ from lapwing.services.autopilot import controller_parameters
 from lapwing.services.autopilot.allocation import virtual_control_effectiveness
 from lapwing.services.autopilot.motor import thrust_at
 from lapwing.services.autopilot.nominal_airframe import known_airframe
-from lapwing.services.common.vehicle_schema import Effects, airframe
+from lapwing.services.common.schemas.vehicle_schema import Effects, airframe
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.studies.performance_card import card
+from lapwing.studies.performance import card
 from lapwing.studies.tune import corners
 from lapwing.studies.tune.linearise import hover
 

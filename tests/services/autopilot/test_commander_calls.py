@@ -6,6 +6,7 @@ from flights import ENABLED, NAN, RATE, SCENE, command, inject, item
 from lapwing.services.autopilot.commander_block import CommanderBlock
 from lapwing.services.common.failure_types import GARBAGE, OFF, SOUND, STUCK, WRONG
 from lapwing.services.scene_resolver import load, resolve
+from tests.combinations import NIGHTLY
 from tests.cosim import memory_log
 
 pytestmark = pytest.mark.long
@@ -63,6 +64,11 @@ CASES = {
     "no link, an emptying battery": (MISSION, 10.0, {}, BATTERY),
     "no trajectory": (GROUND, 6.0, {0.04: [command("takeoff", 2.0), command("arm", NAN, 10.0)]}, []),
 }  # fmt: skip
+EVERY_DAY = {
+    "no commands", "from the ground to the ground", "answers at other ticks than looks", "the link is lost",
+    "a fence is left", "a mission by command", "offboard, and setpoints that stop", "sticks", "the GPS is injured",
+    "on the truth", "no trajectory",
+}  # fmt: skip
 ROUNDS = {"no commands": 4.0 * RATE / 5 + 1}
 """Count the commander steps in these flights."""
 
@@ -84,7 +90,7 @@ def operator_of(script, answers_every):
 def fly_counted(name, monkeypatch, always):
     """Return the flight and the number of commander steps."""
     scene, seconds, script, overrides = CASES[name]
-    setup = resolve(load(scene, [*overrides, f"run.duration={seconds}"]))
+    config = resolve(load(scene, [*overrides, f"run.duration={seconds}"]))
     requested = []
 
     def on_tick(self, tick, act=CommanderBlock.on_tick):
@@ -94,11 +100,11 @@ def fly_counted(name, monkeypatch, always):
 
     with monkeypatch.context() as patch:
         patch.setattr(CommanderBlock, "on_tick", on_tick)
-        log = memory_log.fly(setup, operator_of(script, setup.services["autopilot"].parameters.answers_every))
+        log = memory_log.fly(config, operator_of(script, config.services["autopilot"].parameters.answers_every))
     return log, len(requested)
 
 
-@pytest.mark.parametrize("name", CASES)
+@pytest.mark.parametrize("name", [n if n in EVERY_DAY else pytest.param(n, marks=NIGHTLY) for n in CASES])
 def test_sparse_commander_equals_commander_every_tick(name, monkeypatch):
     always, most = fly_counted(name, monkeypatch, always=True)
     seldom, requested = fly_counted(name, monkeypatch, always=False)

@@ -7,8 +7,8 @@ from lapwing.dynamics.environment import STANDARD
 from lapwing.dynamics.lie.quaternion import exp, multiply, rotation_matrix
 from lapwing.dynamics.vector import ZERO
 from lapwing.services.autopilot import estimator
-from lapwing.services.autopilot.estimator import delayed_measurements, filter_state, fuse, gps_fusion
-from lapwing.services.autopilot.estimator.delayed_measurements import Noise
+from lapwing.services.autopilot.estimator import filter_state, fuse, gps_fusion
+from lapwing.services.autopilot.estimator.gps_fusion import Noise
 
 P = estimator.PRESETS["rtk"]
 AGE = 25  # [ticks] delay of a fix: 0.1 s
@@ -72,7 +72,7 @@ def test_covariance_against_dense_matrices(share):
     # 1^2 + 2^2: force components that an attitude error rotates onto the axis
     noise += (0.02 if block[1] > 0.0 else 0.05) * share * 5.0
     part = min(noise / now, 1.0)
-    s, largest = delayed_measurements.delayed_innovation_variances(m, 0, since, variance, force)
+    s, largest = gps_fusion.delayed_innovation_variances(m, 0, since, variance, force)
     assert s == pytest.approx(now * (1.0 - part) + variance)
     assert largest == pytest.approx(now + noise + variance)
     fuse.apply_update(m, 0.7, s)
@@ -107,8 +107,8 @@ def test_delayed_rows_are_invariant_to_constant_attitude_error():
     _, _, delay, weighted, mean = gps_fusion._past(P, one, AGE)
     matrix = rotation_matrix(one.nominal.attitude)
     for row, force, at in (
-        (delayed_measurements.delayed_velocity_row, mean, filter_state.VELOCITY),
-        (delayed_measurements.delayed_position_row, weighted, filter_state.POSITION),
+        (gps_fusion.delayed_velocity_row, mean, filter_state.VELOCITY),
+        (gps_fusion.delayed_position_row, weighted, filter_state.POSITION),
     ):
         for axis in range(3):
             row(one.memory, force, matrix, axis, delay)
@@ -132,6 +132,6 @@ def test_exact_past_measurement_leaves_only_later_noise():
     m.covariance[:] = np.eye(filter_state.SIZE)
     m.row[:] = 0.0
     m.row[filter_state.VELOCITY + 1] = 1.0
-    s, _ = delayed_measurements.delayed_innovation_variances(m, 1, Noise(0.25, 0.0, 0.0, 0.0, 0.0), 0.0, REST)
+    s, _ = gps_fusion.delayed_innovation_variances(m, 1, Noise(0.25, 0.0, 0.0, 0.0, 0.0), 0.0, REST)
     fuse.apply_update(m, 0.3, s)
     assert m.covariance[filter_state.VELOCITY + 1, filter_state.VELOCITY + 1] == pytest.approx(0.25)

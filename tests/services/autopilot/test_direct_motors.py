@@ -40,14 +40,14 @@ def test_external_voltages_reproduce_controlled_flight():
 def test_direct_voltages_are_held_limited_and_time_out(tmp_path):
     script = UP | {3.0: [motors(7.0, 8.0, -1.0, 1e6), command("offboard")], 3.1: [command("hold")]}
     log = tmp_path / "direct.mcap"
-    setup = resolve(load("hover", [*OPERATED, "run.duration=8"]))
-    fly_single(setup, log, operator=scripted(script))
+    config = resolve(load("hover", [*OPERATED, "run.duration=8"]))
+    fly_single(config, log, operator=scripted(script))
     with LogReader(log) as read:
         times, actuators = read.history("/drone1/actuators")
         _, truth = read.history("/drone1/ground_truth")
         digest = read.metadata["digest"]
     direct = (times >= 3_000_000_000) & (times < 3_100_000_000)
-    highest = setup.services["autopilot"].parameters.airframe.voltage_max
+    highest = config.services["autopilot"].parameters.airframe.voltage_max
     assert np.array_equal(np.unique(actuators["motor_voltage"][direct], axis=0), [[7.0, 8.0, 0.0, highest]])
     assert not np.array_equal(actuators["motor_voltage"][times == 3_100_000_000][0], [7.0, 8.0, 0.0, highest])
     assert np.ptp(truth["angular_velocity"][direct], axis=0).max() > 0.5  # the voltages disturbed the vehicle

@@ -25,6 +25,7 @@ from lapwing.services.autopilot.failure_injection.failure_state import SLOWED
 from lapwing.services.autopilot.failure_injection.reading_failures import EXCESS_DYNAMIC, EXCESS_RANGE
 from lapwing.services.autopilot.schema import NEEDED
 from lapwing.services.common.failure_types import DELAYED, GARBAGE, INTERMITTENT, KINDS, OFF, SLOW, STUCK, WRONG
+from tests.combinations import rest_nightly
 
 pytestmark = pytest.mark.long
 
@@ -47,7 +48,7 @@ def by_flow(kind):
     return flight
 
 
-@pytest.mark.parametrize("kind", [OFF, STUCK, GARBAGE, WRONG], ids=lambda kind: KINDS[kind])
+@pytest.mark.parametrize("kind", rest_nightly(OFF, STUCK, GARBAGE, WRONG), ids=lambda kind: KINDS[kind])
 def test_failed_flow_without_gps_causes_descent(kind):
     flight = by_flow(kind)
     assert rejected(flight, 14.0, "optical_flow") > 0.9
@@ -58,7 +59,7 @@ def test_failed_flow_without_gps_causes_descent(kind):
     assert mode(flight, 26.0) == "descend"
 
 
-@pytest.mark.parametrize("kind", [SLOW, DELAYED, INTERMITTENT], ids=lambda kind: KINDS[kind])
+@pytest.mark.parametrize("kind", rest_nightly(SLOW, DELAYED, INTERMITTENT), ids=lambda kind: KINDS[kind])
 def test_remaining_flow_readings_sustain_flight(kind):
     flight = by_flow(kind)
     assert mode(flight, 26.0) == "hold"
@@ -66,7 +67,7 @@ def test_remaining_flow_readings_sustain_flight(kind):
     assert error(flight, 9.0) < 1.5
 
 
-@pytest.mark.parametrize("kind", ALL, ids=lambda kind: KINDS[kind])
+@pytest.mark.parametrize("kind", rest_nightly(*ALL, keep=2), ids=lambda kind: KINDS[kind])
 def test_failed_flow_with_gps_does_not_affect_flight(kind):
     flight = fly_by_sensors(13, {9: [inject("optical_flow", kind)]}, ENABLED, FLOW)
     sound = fly_by_sensors(13, {}, ENABLED, FLOW)
@@ -77,7 +78,7 @@ def test_failed_flow_with_gps_does_not_affect_flight(kind):
     )
 
 
-@pytest.mark.parametrize("kind", [OFF, GARBAGE, WRONG], ids=lambda kind: KINDS[kind])
+@pytest.mark.parametrize("kind", rest_nightly(OFF, GARBAGE, WRONG), ids=lambda kind: KINDS[kind])
 def test_rangefinder_that_looks_down_fails_as_distance_sensor(kind):
     sensors = [f"sensors.{name}={{}}" for name in (*NEEDED, "barometer")]
     laser = ["sensors.rangefinder.preset=lidar_lite_v3"]
@@ -109,7 +110,7 @@ def test_rangefinder_that_autopilot_does_not_read_cannot_fail():
     assert "inject failure: the vehicle has no distance_sensor" in sent_texts(flight)
 
 
-@pytest.mark.parametrize("kind", ALL, ids=lambda kind: KINDS[kind])
+@pytest.mark.parametrize("kind", rest_nightly(*ALL, keep=2), ids=lambda kind: KINDS[kind])
 def test_failed_airspeed_is_reported_and_not_used(kind):
     flight = fly_by_sensors(12, {9: [inject("airspeed", kind)]}, ENABLED, TUBE)
     assert results(flight)[7] == ACCEPTED

@@ -8,6 +8,7 @@ import pytest
 from flights import ACCEPTED, REJECTED, UP, at, command, fly, height, item, mode, place, results, sent_texts
 
 from lapwing.services.scene_resolver import load
+from tests.combinations import rest_nightly
 from tests.cosim import memory_log
 
 pytestmark = pytest.mark.long
@@ -72,7 +73,7 @@ def test_damaged_rotor_is_named_and_vehicle_lands(rotor):
     failed = flight.column("status", lambda m: m.failed_motor)
     times = flight.times("status")
     assert set(failed[times < 8.0]) == {0}
-    assert failed[times > 8.6][0] == rotor
+    assert failed[times > 9.0][0] == rotor  # theory, eq. (4.26b): 0.88 s for this loss of 45 %
     assert not at(flight, "status", 20.0, lambda m: m.armed)
 
 
@@ -184,7 +185,7 @@ def test_trajectory_ends_when_position_returns_without_operator():
     assert at(flight, "setpoint", 6.0, lambda m: m.position.z) < 1.0  # the commander's setpoint, not the trajectory
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize("seed", rest_nightly(1, 2, 3))
 @pytest.mark.parametrize("wind", [(3.0, 1.0), (8.0, 3.0)])
 def test_delivery_mission_raises_no_motor_alarm(seed, wind):
     mean, sigma = wind

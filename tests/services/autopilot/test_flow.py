@@ -12,7 +12,7 @@ from lapwing.dynamics.lie.quaternion import exp, from_roll_pitch_yaw, multiply, 
 from lapwing.dynamics.noise import TURN_ON, normal3, stream_key
 from lapwing.kernels import kernel
 from lapwing.services.autopilot import estimator
-from lapwing.services.autopilot.estimator import filter_state, flow_fusion
+from lapwing.services.autopilot.estimator import filter_state, heading_and_velocity_fusion
 from lapwing.services.common.failure_types import OFF
 from lapwing.services.sensors import gps, imu, magnetometer, optical_flow, sonar
 
@@ -34,7 +34,7 @@ def test_row_against_differences_and_sensor(axis):
         ahead, left, _ = np.array(rotation_matrix(q)).reshape(3, 3).T @ v
         return (left / distance, -ahead / distance)[axis]
 
-    expected = flow_fusion.flow_row(memory, r, tuple(velocity), axis, distance)
+    expected = heading_and_velocity_fusion.flow_row(memory, r, tuple(velocity), axis, distance)
     assert expected == pytest.approx(camera_flow(attitude, velocity))
     h = 1e-6
     for i in range(3):

@@ -26,7 +26,7 @@ from flights import (
 )
 
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
-from lapwing.cosim.executors.single_process import PAGE
+from lapwing.cosim.executors.single_process import KEPT_TICKS
 from lapwing.services.autopilot.failure_injection.failure_state import DELAY, SLOWED
 from lapwing.services.common.failure_types import (
     DELAYED,
@@ -43,6 +43,7 @@ from lapwing.services.common.failure_types import (
 )
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
+from tests.combinations import rest_nightly
 from tests.cosim import memory_log
 
 pytestmark = pytest.mark.long
@@ -88,15 +89,15 @@ FAILING = [unit for unit in UNITS if unit not in OF_SYSTEMS]
 def received(kind, seconds=4.0, start=1.0):
     """Return the outputs of sensors and estimator on the ground if every sensor fails in one way from `start` [s]."""
     scene = load("groundstation", [ENABLED, *LOOKING, "autopilot.follow_trajectory=false", f"run.duration={seconds}"])
-    setup = resolve(scene)
+    config = resolve(scene)
     operator = scripted({start: [inject(unit, kind, id=k + 1) for k, unit in enumerate(FAILING)]})
-    graph = BlockDiagram(
-        setup, create_all(setup, operator), PAGE, [*SENSORS, *(f"{name}.received" for name in SENSORS)]
+    diagram = BlockDiagram(
+        config, create_all(config, operator), KEPT_TICKS, [*SENSORS, *(f"{name}.received" for name in SENSORS)]
     )
-    graph.advance(setup.last_tick + 1)
+    diagram.advance(config.last_tick + 1)
     for name in SENSORS:
-        period = graph.ports[name].period
-        rows = [graph.history(port, period) for port in (name, f"{name}.received")]
+        period = diagram.ports[name].period
+        rows = [diagram.history(port, period) for port in (name, f"{name}.received")]
         first = -(-round(start * RATE) // period) + 1  # the first reading that is certainly affected
         yield name, round(DELAY * RATE / period), first, *rows
 
@@ -167,7 +168,7 @@ def test_stuck_motor_keeps_speed_and_others_compensate():
 def test_weak_motor_is_detected_and_vehicle_lands_upright():
     flight = fly(16, UP | {6: [inject("motor", WRONG, 3)]}, ENABLED)
     assert "a motor has failed: land" in sent_texts(flight)
-    assert at(flight, "status", 6.5, lambda m: m.failed_motor) == 3
+    assert at(flight, "status", 7.0, lambda m: m.failed_motor) == 3  # theory, eq. (4.26b): 0.88 s for a loss of 45 %
     sound = flight.column("actuators", lambda m: tuple(m.motor_voltage))[flight.times("actuators") < 5.9][-1]
     assert voltages(flight, 6.02)[0, 2] < 0.9 * sound[2]  # the voltage at the weak motor; the controller commands more
     assert height(flight, 7.0) > 2.0
@@ -256,12 +257,17 @@ def test_lost_gps_descends_then_holds_on_recovery():
 
 @pytest.mark.parametrize(
     ("unit", "kind"),
-    [
-        *[(unit, kind) for unit in ("gps", "magnetometer", "barometer") for kind in (STUCK, GARBAGE, WRONG)],
-        *[(unit, OFF) for unit in ("magnetometer", "barometer", "distance_sensor")],
-        ("distance_sensor", GARBAGE),
-        ("distance_sensor", WRONG),
-    ],
+    rest_nightly(
+        ("gps", GARBAGE),
+        ("magnetometer", STUCK),
+        ("barometer", WRONG),
+        ("distance_sensor", OFF),
+        *[("gps", kind) for kind in (STUCK, WRONG)],
+        *[("magnetometer", kind) for kind in (OFF, GARBAGE, WRONG)],
+        *[("barometer", kind) for kind in (OFF, STUCK, GARBAGE)],
+        *[("distance_sensor", kind) for kind in (GARBAGE, WRONG)],
+        keep=4,
+    ),
     ids=lambda value: value if isinstance(value, str) else KINDS[value],
 )
 def test_failed_sensor_is_rejected_and_flight_continues(unit, kind):
@@ -272,7 +278,7 @@ def test_failed_sensor_is_rejected_and_flight_continues(unit, kind):
     assert math.dist(place(flight, 13.0)[:2], place(flight, 9.0)[:2]) < 1.5
 
 
-@pytest.mark.parametrize("kind", [SLOW, DELAYED, INTERMITTENT], ids=lambda kind: KINDS[kind])
+@pytest.mark.parametrize("kind", rest_nightly(SLOW, DELAYED, INTERMITTENT), ids=lambda kind: KINDS[kind])
 @pytest.mark.parametrize("units", [("gps", "magnetometer"), ("barometer", "distance_sensor")])
 def test_remaining_readings_are_fused(units, kind):
     flight = fly_by_sensors(13, {9: [inject(unit, kind, id=k + 1) for k, unit in enumerate(units)]}, ENABLED)
@@ -282,7 +288,7 @@ def test_remaining_readings_are_fused(units, kind):
         assert all(0.1 < rejected(flight, 10.0, name) < 1.0 for name in names)
 
 
-@pytest.mark.parametrize("kind", [OFF, STUCK, GARBAGE, SLOW, DELAYED], ids=lambda kind: KINDS[kind])
+@pytest.mark.parametrize("kind", rest_nightly(OFF, STUCK, GARBAGE, SLOW, DELAYED), ids=lambda kind: KINDS[kind])
 @pytest.mark.parametrize("unit", ["accelerometer", "gyro"])
 def test_vehicle_drifts_without_inertial_sensor(unit, kind):
     flight = fly_by_sensors(15.5, {9: [inject(unit, kind)]}, ENABLED)

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from lapwing.dynamics.environment import STANDARD
+from lapwing.flights.flight_data import FlightData
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.studies.flight_data import FlightData
 
 ANOMALY = "environment.magnetic_anomaly=[2e-6,-1e-6,3e-6]"
 

@@ -11,7 +11,7 @@ from lapwing.kernels import python_function
 from lapwing.services.autopilot import controller_parameters
 from lapwing.services.autopilot.allocation import effectiveness, tilted_effectiveness
 from lapwing.services.autopilot.nominal_airframe import known_airframe
-from lapwing.services.common.vehicle_schema import airframe
+from lapwing.services.common.schemas.vehicle_schema import airframe
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.simulate import fly
 from lapwing.studies.tune.linearise import hover
@@ -39,7 +39,7 @@ def test_hexacopter_with_tilted_rotors_hovers_turns_and_lands():
     flight = fly(load(SCENE))
     assert str(flight.outcome).startswith("Landed")
     assert "upright" in str(flight.outcome)
-    t = flight.setup.interval * np.arange(len(flight.truth))
+    t = flight.config.interval * np.arange(len(flight.truth))
     hover = (t > 6.5) & (t < 8.0)
     lift = flight.truth.rotor_thrust[hover].sum(axis=1).mean() * np.cos(np.radians(15.0))
     assert lift == pytest.approx(2.4 * 9.80665, rel=0.01)

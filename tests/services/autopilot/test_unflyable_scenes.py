@@ -6,7 +6,7 @@ from lapwing.cosim.scene import SceneError
 from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.vehicles import performance
 from lapwing.dynamics.vehicles.airframe import load_airframe
-from lapwing.services.common.run_schema import SHIPPED
+from lapwing.services.common.schemas.run_schema import SHIPPED
 from lapwing.services.scene_resolver import load
 
 DRONE = load_airframe(SHIPPED / "vehicles" / "delivery_drone.toml")

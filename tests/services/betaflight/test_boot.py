@@ -4,7 +4,7 @@ import pytest
 
 from lapwing.services.betaflight import boot
 from lapwing.services.betaflight.boot import lines
-from lapwing.services.common.firmware.link import FirmwareError
+from lapwing.services.common.firmware.program import FirmwareError
 from lapwing.services.scene_resolver import load, resolve
 
 
@@ -45,21 +45,21 @@ class Running:
 def configure(monkeypatch, line, overrides=()):
     monkeypatch.setattr(boot, "connect", lambda *_: line)
     monkeypatch.setattr(boot, "REPEAT", 0.0)
-    setup = resolve(load("betaflight_quad", list(overrides))).services["betaflight"].parameters
-    boot._configure(setup, Running(), lambda text: None)
-    return setup
+    config = resolve(load("betaflight_quad", list(overrides))).services["betaflight"].parameters
+    boot.configure(config, Running(), lambda text: None)
+    return config
 
 
 def test_lost_entry_to_command_line_is_repeated(monkeypatch):
     line = CommandLine(lost=2)
-    setup = configure(monkeypatch, line)
+    config = configure(monkeypatch, line)
     assert line.received[:4] == ["#", "#", "#", "version\n"]
-    assert line.received[4:] == [*(f"{text}\n" for text in lines(setup)), "save\n"]
+    assert line.received[4:] == [*(f"{text}\n" for text in lines(config)), "save\n"]
 
 
 def test_lines_of_scene_come_last():
-    setup = resolve(load("betaflight_quad", ["autopilot.parameters={thrust_linear=20}"]))
-    assert lines(setup.services["betaflight"].parameters)[-1] == "set thrust_linear = 20"
+    config = resolve(load("betaflight_quad", ["autopilot.parameters={thrust_linear=20}"]))
+    assert lines(config.services["betaflight"].parameters)[-1] == "set thrust_linear = 20"
 
 
 def test_rejected_line_is_reported(monkeypatch):

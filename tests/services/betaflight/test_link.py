@@ -5,31 +5,33 @@ import time
 import pytest
 from betaflight_peer import Peer, free_ports
 
+from lapwing.api.flight import Flight
 from lapwing.cosim.log import LogReader
-from lapwing.flight import Flight
 from lapwing.runs.resimulate import resimulate
 from lapwing.runs.single_process_run import fly_single
 from lapwing.services.betaflight.packets import MOTORS
-from lapwing.services.common.firmware.link import FirmwareError
+from lapwing.services.common.firmware.program import FirmwareError
 from lapwing.services.scene_resolver import load, resolve
 
 PATIENT = 60.0  # [s] for a busy machine
 
 
-def setup(first, duration=3.0, **keys):
+def config(first, duration=3.0, overrides=(), **keys):
     keys = {"start_timeout": PATIENT, "step_timeout": PATIENT} | keys
     values = [f"autopilot.{key}={value}" for key, value in keys.items()]
-    return resolve(load("betaflight_quad", [f"autopilot.port={first}", f"run.duration={duration}", *values]))
+    return resolve(
+        load("betaflight_quad", [f"autopilot.port={first}", f"run.duration={duration}", *values, *overrides])
+    )
 
 
-def fly(tmp_path, answer=None, duration=3.0, blockers=0, **keys):
+def fly(tmp_path, answer=None, duration=3.0, blockers=0, overrides=(), **keys):
     """Return the flight and the log's metadata."""
     first = free_ports()
     log = tmp_path / "flight.mcap"
     with Peer(first, answer, blockers) as peer:
         if answer and hasattr(answer, "peer"):
             answer.peer = peer
-        fly_single(setup(first, duration, **keys), log)
+        fly_single(config(first, duration, overrides, **keys), log)
     with LogReader(log) as read:
         metadata = dict(read.metadata)
     return Flight.read(log), metadata, peer
@@ -41,7 +43,7 @@ def test_scripted_firmware_takes_off_and_log_resimulates(tmp_path):
     assert not peer.early
     assert metadata["firmware"].startswith("betaflight: 1501 steps")
     assert "rejected 0" in metadata["firmware"]
-    assert metadata["reproducible"] == "no: betaflight has no lock step"
+    assert metadata["repeatable"] == "no: Lapwing did not start it"
     assert len({state[0] for state in peer.states}) == 1  # equal times keep the firmware's clock at wall time
     resting = peer.states[100]
     assert resting[4:7] == pytest.approx((0.0, 0.0, -9.81), abs=0.5)
@@ -98,6 +100,16 @@ def test_firmware_may_restart(tmp_path):
     assert flight.truth.position[-1, 2] > 0.1
 
 
+@pytest.mark.long
+def test_lost_position_ends_in_level_landing(tmp_path):
+    faults = 'sensors.gps.faults=[{kind="dropout", start=4.0}]'
+    flight, _, _ = fly(tmp_path, duration=25.0, overrides=[faults])
+    assert flight.outcome.kind == "ended in failsafe"
+    assert "no position: descends level and lands at 5." in str(flight.outcome)
+    assert flight.outcome.touchdown < 1.5
+    assert abs(flight.truth.position[:, :2]).max() < 2.0
+
+
 def test_stall_ends_run_and_is_reported(tmp_path):
     def answer(n, reply):
         return [reply] if n < 800 else []
@@ -112,7 +124,7 @@ def test_stall_ends_run_and_is_reported(tmp_path):
 def test_absent_firmware_is_reported(tmp_path):
     first = free_ports()
     with pytest.raises(FirmwareError, match=rf"no answer at 127.0.0.1:{first + 3} after 0.3 s; start betaflight"):
-        fly_single(setup(first, start_timeout=0.3), tmp_path / "flight.mcap")
+        fly_single(config(first, start_timeout=0.3), tmp_path / "flight.mcap")
 
 
 def test_arming_blockers_are_reported(tmp_path):
@@ -127,10 +139,10 @@ def test_used_port_is_reported(tmp_path):
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as other:
         other.bind(("127.0.0.1", first))
         with pytest.raises(FirmwareError, match=rf"cannot listen on udp 127.0.0.1:{first} .*stop the other"):
-            fly_single(setup(first), tmp_path / "flight.mcap")
+            fly_single(config(first), tmp_path / "flight.mcap")
 
 
 def test_other_betaflight_is_reported(tmp_path):
     first = free_ports()
-    with Peer(first), pytest.raises(FirmwareError, match=rf"TCP port {first + 3} is in use: another Betaflight runs"):
-        fly_single(setup(first, command='["true"]'), tmp_path / "flight.mcap")
+    with Peer(first), pytest.raises(FirmwareError, match=r"cannot listen on udp 127.0.0.1:.*stop the other"):
+        fly_single(config(first, command='["true"]'), tmp_path / "flight.mcap")

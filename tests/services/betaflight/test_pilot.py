@@ -5,7 +5,7 @@ import math
 import pytest
 
 from lapwing.services.betaflight.packets import RC_HIGH, RC_LOW, RC_MIDDLE
-from lapwing.services.betaflight.pilot import Motion, Pilot
+from lapwing.services.betaflight.pilot import LOST_AFTER, Motion, Pilot
 from lapwing.services.common.ports import Setpoint
 from lapwing.services.scene_resolver import load, resolve
 
@@ -92,6 +92,33 @@ def test_point_mass_flies_to_target_and_lands(pilot_setup):
     assert pilot.finished
     assert farthest < 0.15
     assert math.dist(x, (2.0, -1.0, START[2])) < 0.15
+
+
+def test_point_mass_without_position_descends_level_and_lands(pilot_setup):
+    """The position is lost at 5 s in forward flight at 2 m; losses are 10 % of the thrust."""
+    pilot, g = Pilot(pilot_setup, START), pilot_setup.gravity
+    z, v, t, fastest = START[2], 0.0, 0.0, 0.0
+    while not pilot.finished and t < 40.0:
+        motion = Motion((0.0, 0.0, z), (1.0, 0.0, v), 0.0, max(0.0, t - 5.0), v)
+        s = pilot.step(t, INTERVAL, Setpoint((5.0, 0.0, 2.0) if t > 1.0 else START), motion)
+        if t > 5.0 + LOST_AFTER:
+            assert (s.roll, s.pitch, s.yaw) == (RC_MIDDLE,) * 3
+            fastest = min(fastest, v)
+        u = 0.055 + 0.945 * max(0, s.throttle - 1050) / 950 if s.arm == RC_HIGH else 0.0
+        v += (0.9 * g * (u / pilot_setup.hover_output) ** 2 - g) * INTERVAL
+        z += v * INTERVAL
+        if z <= START[2]:
+            z, v = START[2], 0.0
+        t += INTERVAL
+    assert pilot.lost
+    assert pilot.finished
+    assert -1.5 < fastest < -0.5
+    assert t < 15.0
+
+
+def test_pilot_does_not_arm_without_position(pilot_setup):
+    motion = AT_REST._replace(age=2.0)
+    assert Pilot(pilot_setup, START).step(2.0, INTERVAL, Setpoint((0.0, 0.0, 1.0)), motion).arm == RC_LOW
 
 
 def test_hover_throttle_matches_firmware(pilot_setup):

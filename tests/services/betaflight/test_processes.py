@@ -10,9 +10,9 @@ import pytest
 from betaflight_peer import Peer, free_ports
 
 from lapwing import Simulator
+from lapwing.api.flight import Flight
 from lapwing.cosim.log import LogReader
 from lapwing.cosim.scene import SceneError
-from lapwing.flight import Flight
 from lapwing.runs.resimulate import resimulate
 from lapwing.services.scene_resolver import load
 from tests.participants import running
@@ -71,11 +71,21 @@ def lapwing(*arguments):
 def test_multi_process_run_reports_firmware_and_resimulates(tmp_path):
     first, log = free_ports(), tmp_path / "flight.mcap"
     with Peer(first):
-        done = lapwing("run", "betaflight_quad", "--log", log, "--set", "run.duration=3", *options(first))
+        done = lapwing(
+            "run",
+            "betaflight_quad",
+            "--mode",
+            "multi-process",
+            "--log",
+            log,
+            "--set",
+            "run.duration=3",
+            *options(first),
+        )
     assert "betaflight: 1501 steps" in done.stdout, done.stderr
     assert Flight.read(log).truth.position[-1, 2] > 0.1
     with LogReader(log) as read:
-        assert read.metadata["reproducible"] == "no: betaflight has no lock step"
+        assert read.metadata["repeatable"] == "no: Lapwing did not start it"
     before, after = resimulate(log)
     assert before == after
 
@@ -84,7 +94,7 @@ def test_multi_process_run_reports_firmware_and_resimulates(tmp_path):
 def test_stalled_firmware_is_reported_and_log_readable(tmp_path):
     first, log = free_ports(), tmp_path / "flight.mcap"
     with Peer(first, lambda n, reply: [reply] if n < 900 else []):
-        done = lapwing("run", "betaflight_quad", "--log", log, "--set", "run.duration=20",
+        done = lapwing("run", "betaflight_quad", "--mode", "multi-process", "--log", log, "--set", "run.duration=20",
                        *options(first, step_timeout=4.0))  # fmt: skip
     assert done.returncode == 1
     assert ": no motor outputs for 4 s at t = " in done.stderr

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from lapwing.cosim.scene import SceneError
-from lapwing.services.common.vehicle_schema import rotor_constants
+from lapwing.services.common.schemas.vehicle_schema import rotor_constants
 from lapwing.services.scene_resolver import load
 
 TABLE = '[effects.rotor_table]\nfile = "prop.txt"'

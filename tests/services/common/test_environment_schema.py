@@ -12,8 +12,8 @@ from lapwing.dynamics.geodesy import normal_gravity
 from lapwing.dynamics.terrain import Level, surface
 from lapwing.messages import NavSatStatus
 from lapwing.messages.topics import BARO, GPS
-from lapwing.services.common.environment_schema import environment
-from lapwing.services.common.vehicle_schema import active, gravity, start_pose
+from lapwing.services.common.schemas.environment_schema import environment
+from lapwing.services.common.schemas.vehicle_schema import active, gravity, start_pose
 from lapwing.services.scene_resolver import from_resolved, load, resolve
 from tests.cosim.service_harness import Alone
 
@@ -31,26 +31,26 @@ def test_environment_has_standard_defaults():
 
 
 def test_all_services_share_environment():
-    setup = resolve(scene := load("delivery_mission", PLACE))
+    config = resolve(scene := load("delivery_mission", PLACE))
     around = environment(scene)
     assert gravity(scene) == around.gravity == normal_gravity(47.3)
     air = next(effect for effect in active(scene) if hasattr(effect, "atmosphere"))
     assert air.initial_discrete_state()[0] == density(around.atmosphere, 1600.0)
-    instruments = setup.services["sensors"].parameters.instruments
+    instruments = config.services["sensors"].parameters.instruments
     assert {instrument.around.home for instrument in instruments} == {around.home}
-    filter_ = setup.services["autopilot"].parameters.estimator
+    filter_ = config.services["autopilot"].parameters.estimator
     assert (filter_.home, filter_.atmosphere, filter_.gravity) == (around.home, around.atmosphere, around.gravity)
     assert filter_.magnetic_field_world == around.magnetic_field_world != STANDARD.magnetic_field_world
     assert filter_.sonar_height_max == 0.0  # the filter assumes level ground
-    assert setup.auxiliary["mavlink"].home == around.home
-    assert setup.auxiliary["mavlink"].air_temperature == pytest.approx(15.0 + 12.0 - 0.0065 * 1600.0, abs=0.01)
+    assert config.auxiliary["mavlink"].home == around.home
+    assert config.auxiliary["mavlink"].air_temperature == pytest.approx(15.0 + 12.0 - 0.0065 * 1600.0, abs=0.01)
 
 
 @pytest.mark.long
 def test_barometer_and_rotors_share_atmosphere():
     scene = load("delivery_mission", {**PLACE, "sensors.barometer.preset": "ideal", "sensors.gps.preset": "standard"})
     sensors, plant = Alone(scene, "sensors"), resolve(scene).services["plant"].parameters
-    sensors.step(truth=sensors.setup.port("truth").like)
+    sensors.step(truth=sensors.config.port("truth").example)
     around = environment(scene)
     assert sensors.message(BARO).fluid_pressure == pressure(around.atmosphere, 1600.0)
     assert sensors.message(GPS).status.status == NavSatStatus.STATUS_FIX  # not RTK
@@ -96,10 +96,7 @@ def test_recorded_scene_needs_no_terrain_file(tmp_path):
         ({"terrain": {"grid": {"heights": [[0.0, float("nan")]]}}}, "heights.0.1: expected a finite number, got nan"),
         ({"terrain": {"grid": {"spacing": 1.0}}}, "terrain.grid: has neither file nor heights"),
         ({"terrain": {"grid": {"file": "no.npy"}}}, "no.npy: no such file or directory"),
-        (
-            {"terrain": {"grid": {"heights": [[0.0, 1.0], [0.0, 1.0]], "reach": 5.0}}},
-            "grid.reach: needs a GeoTIFF",
-        ),
+        ({"terrain": {"grid": {"heights": [[0.0, 1.0], [0.0, 1.0]], "reach": 5.0}}}, "grid.reach: needs a GeoTIFF"),
         (
             {"terrain": {"steps": {"distance": [1.0], "rise": []}}},
             "steps.rise: expected one for each distance (1), got 0",

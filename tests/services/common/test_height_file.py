@@ -9,7 +9,7 @@ import pytest
 
 from lapwing.cosim.scene import SceneError
 from lapwing.dynamics.terrain import surface
-from lapwing.services.common.environment_schema import environment
+from lapwing.services.common.schemas.environment_schema import environment
 from lapwing.services.scene_resolver import load
 
 rasterio = pytest.importorskip("rasterio")

@@ -4,18 +4,18 @@ import base64
 import json
 import re
 import struct
+import sys
 
 import numpy as np
 import pytest
 
 from lapwing.cosim.scene import SceneError
-from lapwing.services.common.mesh_file import MOST, read
-from lapwing.services.common.mesh_schema import pack, unpack
-from lapwing.services.common.run_schema import SHIPPED
+from lapwing.flights.flight_provenance import Origin
+from lapwing.services.common.schemas.mesh_schema import MOST, pack, read, unpack
+from lapwing.services.common.schemas.run_schema import SHIPPED
 from lapwing.services.scene_resolver import from_resolved, load, resolve
-from lapwing.studies.flight_provenance import Origin
-from lapwing.studies.view3d.vehicle_bodies import motion
-from tests.studies import synthetic_flights
+from lapwing.views.view3d.vehicle_bodies import motion
+from tests.flights import synthetic_flights
 
 # A pyramid on a square with an eccentric apex, so that swapped axes are detected.
 CORNERS = np.array([(0, 0, 0), (0.4, 0, 0), (0.4, 0.3, 0), (0, 0.3, 0), (0.1, 0.05, 0.2)], np.float32)
@@ -118,23 +118,26 @@ def test_mesh_is_equal_in_all_file_formats(tmp_path, name, content):
     [
         ("no.stl", None, "no such file"),
         ("a.step", b"", "expected the path of a file that ends in .stl, .obj, .glb, .gltf, got '../a.step'"),
-        ("a.stl", b"", "not an STL file"),
-        ("a.stl", binary()[:-7], "not an STL file"),
-        ("a.stl", b"solid x\nvertex 1 2 3\nvertex 1 2 3\n", "fewer than three corners"),
-        ("a.stl", b"solid x\nvertex 1 two 3\n", "not three numbers"),
+        ("a.stl", b"", "no triangles, or is cut off"),
+        ("a.stl", binary()[:-7], "no triangles, or is cut off"),
+        ("a.stl", b"solid x\nvertex 1 2 3\nvertex 1 2 3\nendsolid\n", "not a valid .stl file"),
+        ("a.stl", b"solid x\nvertex 1 two 3\nendsolid\n", "not a valid .stl file"),
         ("a.stl", ascii_stl().replace(b"endsolid", 3 * b"vertex nan 0 0\n" + b"endsolid"), "not finite"),
         ("a.stl", b"solid x\nendsolid x\n", "no triangles"),
         ("a.stl", bytes(80) + struct.pack("<I", MOST + 1) + bytes(50 * (MOST + 1)), f"expected at most {MOST}"),
-        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "line 4: "),
-        ("a.obj", b"v 0 0 0\nf a b c\n", "line 2: "),
-        ("a.glb", glb(*gltf())[:-20], "cut off"),
-        ("a.glb", glb(*gltf())[:30], "not a glTF 2.0 file"),
-        ("a.glb", b"glTF", "not a glTF 2.0 file"),
-        ("a.gltf", b"[1]", "not a glTF 2.0 file"),
-        ("a.gltf", b"no", "not a glTF 2.0 file"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 4\n", "not a valid .obj file"),
+        ("a.obj", b"v 0 0 0\nf a b c\n", "not a valid .obj file"),
+        ("a.obj", b"v 0 0 0\nv 1 0 0\nv 0 1 0\n", "no triangles"),
+        ("a.glb", glb(*gltf())[:-20], "not a valid .glb file"),
+        ("a.glb", glb(*gltf())[:30], "not a valid .glb file"),
+        ("a.glb", b"glTF", "not a valid .glb file"),
+        ("a.gltf", b"[1]", "not a valid .gltf file"),
+        ("a.gltf", b"no", "not a valid .gltf file"),
         ("a.glb", glb(*gltf(extensionsRequired=["KHR_draco_mesh_compression"])), "export it without compression"),
+        ("a.glb", glb(*gltf(accessors=[{"componentType": 5126, "count": 5, "type": "VEC3"}])), "sparse accessors"),
         ("a.glb", glb(*gltf(buffers=[{"uri": "a.bin"}])), "in another file; export it as .glb"),
-        ("a.glb", glb(*gltf(nodes=[{"children": [0]}])), "more than 32 levels"),
+        ("a.glb", glb(*gltf(nodes=[{"children": [0]}])), "no triangles"),
+        ("a.glb", glb(*gltf(nodes=[{"children": [*range(1, 5000)]}, *[{"mesh": 0}] * 5000])), "29994 triangles"),
         ("a.glb", glb(*gltf(scenes=[{}])), "no triangles"),
         ("a.obj", obj().replace(b"0.4", b"400").replace(b"0.3", b"300"), "a mesh in metres"),
     ],
@@ -150,6 +153,25 @@ def test_invalid_mesh_is_rejected(tmp_path, name, content, message):
     assert "\n" not in text
 
 
+def test_lines_and_points_beside_triangles_are_left_out(tmp_path):
+    tree, data = gltf()
+    points = {"attributes": {"POSITION": 0}}
+    primitives = [*tree["meshes"][0]["primitives"], {**points, "mode": 0}, {**points, "mode": 1}]
+    (tmp_path / "a.glb").write_bytes(glb({**tree, "meshes": [{"primitives": primitives}]}, data))
+    assert len(read(tmp_path / "a.glb").faces) == len(FACES)
+
+
+def test_missing_trimesh_is_named_with_its_installation(tmp_path, monkeypatch):
+    (tmp_path / "a.stl").write_bytes(binary())
+    path = scene(tmp_path, "a.stl")
+    monkeypatch.setitem(sys.modules, "trimesh", None)
+    with pytest.raises(
+        SceneError, match=re.escape("airframe.mesh: trimesh is not installed; pip install lapwing[meshes]")
+    ):
+        load(path)
+    load("hover")
+
+
 def scene(folder, mesh):
     """Write `hover` with an airframe in vehicles/ that names a mesh."""
     (folder / "vehicles").mkdir()
@@ -163,11 +185,11 @@ def scene(folder, mesh):
 def test_run_configuration_stores_mesh(tmp_path):
     (tmp_path / "own.stl").write_bytes(binary())
     loaded = load(scene(tmp_path, "own.stl"), ["airframe.mass.centre=[0.1, 0.0, 0.0]"])
-    setup = resolve(loaded)
+    config = resolve(loaded)
     (tmp_path / "own.stl").unlink()
-    assert from_resolved(setup.resolved).resolved == loaded.resolved
+    assert from_resolved(config.resolved).resolved == loaded.resolved
     truth = {"pose.position": (0.0, 0.0, 1.0), "pose.orientation": synthetic_flights.LEVEL, "rotor_speed": (0.0,) * 4}
-    flight = synthetic_flights.flight(3, ground_truth=truth, scene=Origin.of_setup(setup).scene)
+    flight = synthetic_flights.flight(3, ground_truth=truth, scene=Origin.of_config(config).scene)
     (body,) = motion(flight).bodies
     (hull,) = body.solids  # instead of arms and feet
     assert hull.vertices.min(axis=0) == pytest.approx([-0.1, 0.0, 0.0])  # from the centre of mass

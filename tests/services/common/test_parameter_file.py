@@ -9,8 +9,8 @@ import pytest
 from lapwing.cosim.scene import SceneError
 from lapwing.messages import OperatorCommand
 from lapwing.runs.single_process_run import fly_single
+from lapwing.services.autopilot.parameter_file import read, write
 from lapwing.services.common.autopilot_parameters import table
-from lapwing.services.common.parameter_file import read, write
 from lapwing.services.scene_resolver import load, resolve
 
 HOVER = Path("lapwing/scenes/hover.toml")

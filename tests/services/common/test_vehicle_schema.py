@@ -9,8 +9,8 @@ from lapwing.cosim.scene import SceneError
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, rotation_matrix
 from lapwing.messages.topics import IMU, TRUTH
-from lapwing.services.common.communication_schema import ticks
-from lapwing.services.common.vehicle_schema import active, airframe, gravity, start_height, start_pose
+from lapwing.services.common.schemas.communication_schema import ticks
+from lapwing.services.common.schemas.vehicle_schema import active, airframe, gravity, start_height, start_pose
 from lapwing.services.scene_resolver import load
 from tests.cosim.service_harness import Alone
 
@@ -33,7 +33,7 @@ def test_imu_reads_gravity_of_any_gravity_effect():
     sea = {"effects": effects, "environment.home.height": 0.0}
     scene = load("delivery_mission", {**sea, "sensors.imu.preset": "ideal"})
     sensors = Alone(scene, "sensors")
-    sensors.step(truth=sensors.setup.port("truth").like)
+    sensors.step(truth=sensors.config.port("truth").example)
     assert sensors.message(IMU).linear_acceleration.z == pytest.approx(9.80665)
 
 

@@ -184,7 +184,7 @@ def test_foxglove_shows_running_flight(tmp_path, scene, vehicle, more):
         "run",
         scene,
         "--speed",
-        "1",
+        "0.2",  # the flight outlasts a starved client's start
         "--set",
         "run.duration=300",
         "--set",

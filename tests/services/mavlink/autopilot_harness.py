@@ -3,7 +3,7 @@
 from adapter_harness import Bench
 
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
-from lapwing.cosim.executors.single_process import PAGE
+from lapwing.cosim.executors.single_process import KEPT_TICKS
 from lapwing.messages.topics import COMMAND_ACKS, ESTIMATE, STATUS
 from lapwing.services.mavlink.adapter import Adapter
 from lapwing.services.process_table import create_all
@@ -18,11 +18,11 @@ class AutopilotBench(Bench):
     period = 0.04
 
     def __init__(self, scene="hover", *overrides):
-        setup = resolve(load(scene, [*OPERATED, *overrides]))
+        config = resolve(load(scene, [*OPERATED, *overrides]))
         self.queue, self.stations = [], []
-        self._interval_ns, self._ticks = setup.interval_ns, round(self.period * setup.rate)
-        self.graph = BlockDiagram(setup, create_all(setup, self._take_commands), PAGE)
-        self.adapter = Adapter(setup.auxiliary["mavlink"], self.queue.append)
+        self._interval_ns, self._ticks = config.interval_ns, round(self.period * config.rate)
+        self.diagram = BlockDiagram(config, create_all(config, self._take_commands), KEPT_TICKS)
+        self.adapter = Adapter(config.auxiliary["mavlink"], self.queue.append)
 
     def _take_commands(self, tick):
         commands = list(self.queue)
@@ -37,13 +37,13 @@ class AutopilotBench(Bench):
 
     @property
     def seconds(self):
-        return self.graph.tick * self._interval_ns * 1e-9
+        return self.diagram.tick * self._interval_ns * 1e-9
 
     def step(self, count=1):
         for _ in range(count):
-            first = self.graph.tick
-            self.graph.advance(first + self._ticks)
-            pages = self.graph.record_batches(first, first + self._ticks)
+            first = self.diagram.tick
+            self.diagram.advance(first + self._ticks)
+            pages = self.diagram.record_batches(first, first + self._ticks)
             for page in sorted(pages, key=lambda page: page.topic is ESTIMATE):  # the estimate advances the time
                 newest = slice(None) if page.topic in (STATUS, COMMAND_ACKS) else slice(-1, None)
                 for tick, payload in zip(page.ticks[newest], page.payloads[newest], strict=True):

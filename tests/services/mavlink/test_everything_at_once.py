@@ -114,7 +114,7 @@ async def story(drone, log, folder):
     await first(drone.telemetry.armed(), lambda armed: not armed, END)
 
 
-@pytest.mark.parametrize("speed", [1, 5])
+@pytest.mark.parametrize("speed", [pytest.param(1, marks=pytest.mark.nightly), 5])
 def test_stations_offboard_log_and_metadata_share_mission(tmp_path, speed):
     port, log, stations = free_port(), tmp_path / "flight.mcap", [Station(), Station()]
     command = [sys.executable, "-m", "lapwing", "run", SCENE, "--key-prefix", f"test-all-{speed}", "--log", str(log)]

@@ -6,14 +6,7 @@ import numpy as np
 import pytest
 
 from lapwing.dynamics.lie.quaternion import Quaternion, to_roll_pitch_yaw
-from lapwing.services.common.mavlink.frames import (
-    saturate,
-    swap_attitude,
-    swap_body,
-    swap_world,
-    swap_yaw,
-    wrap,
-)
+from lapwing.services.common.mavlink.frames import saturate, swap_attitude, swap_body, swap_world, swap_yaw, wrap
 
 C = np.array([[0, 1, 0], [1, 0, 0], [0, 0, -1.0]])
 D = np.diag([1, -1, -1.0])

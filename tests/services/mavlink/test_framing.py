@@ -8,9 +8,8 @@ import pytest
 from adapter_harness import Bench
 
 from lapwing.services.common.mavlink.dialect import mavlink
-from lapwing.services.mavlink.channel import Channel
+from lapwing.services.mavlink.channel import Channel, frame
 from lapwing.services.mavlink.endpoint import MAX_DATAGRAM
-from lapwing.services.mavlink.framing import frame
 from lapwing.services.mavlink.signing import Signature
 
 SYSTEM = 7

@@ -1,5 +1,7 @@
 """MAVSDK, an independent client, flies the complete vehicle: plant, sensors, estimator, autopilot, link.
 
+Missions, parameters and sticks are in `test_mavsdk.py`, on a fake vehicle.
+
 The run is faster than real time; whatever the client waits for is bounded by END.
 """
 
@@ -9,21 +11,18 @@ import signal
 import socket
 import subprocess
 import sys
-from itertools import pairwise
 
 import pytest
 from fake_vehicle import free_port
 
 mavsdk = pytest.importorskip("mavsdk", reason="mavsdk is not installed: pip install -e .[clients]")
 from mavsdk.action import ActionError  # noqa: E402
-from mavsdk.mission import MissionItem, MissionPlan  # noqa: E402
 from mavsdk.offboard import (  # noqa: E402
     Attitude,
     OffboardError,
     PositionNedYaw,
     VelocityNedYaw,
 )
-from mavsdk.param import ParamError  # noqa: E402
 
 from lapwing.cosim.log import LogReader  # noqa: E402
 from lapwing.runs.resimulate import resimulate  # noqa: E402
@@ -101,6 +100,7 @@ def near(position, place):
     return math.hypot(north, east) < 0.5 and abs(position.relative_altitude_m - place[2]) < 0.5
 
 
+@pytest.mark.nightly
 def test_flight_with_return_and_resimulation_of_log(tmp_path):
     async def story(drone):
         health = await first(drone.telemetry.health(), lambda h: h.is_armable)
@@ -143,37 +143,6 @@ def test_flight_with_return_and_resimulation_of_log(tmp_path):
     assert before == again
 
 
-def test_missions_are_uploaded_flown_paused_and_cleared(tmp_path):
-    def item(north, up):
-        return MissionItem(
-            40.7686 + north / 111_049, 14.7907, up, 5.0, True, math.nan, math.nan, MissionItem.CameraAction.NONE,
-            math.nan, math.nan, math.nan, math.nan, math.nan, MissionItem.VehicleAction.NONE,
-        )  # fmt: skip
-
-    async def story(drone):
-        plan = MissionPlan([item(5.0, 5.0), item(20.0, 8.0), item(0.0, 4.0)])
-        await drone.mission.upload_mission(plan)
-        down = await drone.mission.download_mission()
-        assert [(i.latitude_deg, i.relative_altitude_m) for i in down.mission_items] == [
-            (pytest.approx(i.latitude_deg, abs=1e-7), i.relative_altitude_m) for i in plan.mission_items
-        ]
-        await drone.action.arm()
-        await drone.mission.start_mission()
-        await first(drone.mission.mission_progress(), lambda p: p.current >= 1)
-        await drone.mission.pause_mission()
-        await first(drone.telemetry.flight_mode(), lambda mode: str(mode) == "HOLD")
-        await drone.mission.start_mission()
-        await first(drone.mission.mission_progress(), lambda p: p.current == p.total == 3)
-        assert await drone.mission.is_mission_finished()
-        await first(drone.telemetry.position(), lambda p: near(p, (40.7686, 14.7907, 4.0)))
-        await drone.mission.clear_mission()
-        assert (await drone.mission.download_mission()).mission_items == []
-        await drone.action.land()
-        await first(drone.telemetry.armed(), lambda armed: not armed)
-
-    session(tmp_path, "test-mavsdk-mission", story)
-
-
 def test_offboard_by_position_velocity_and_attitude(tmp_path):
     async def story(drone):
         state = drone.telemetry.position_velocity_ned
@@ -201,55 +170,14 @@ def test_offboard_by_position_velocity_and_attitude(tmp_path):
     session(tmp_path, "test-mavsdk-offboard", story, "autopilot.parameters.COM_OF_LOSS_T=60")
 
 
-def test_parameters_rates_sticks_and_refusals(tmp_path):
-    async def story(drone):
-        before = await drone.param.get_param_float("MPC_XY_CRUISE")
-        assert before == pytest.approx(5.0)
-        await drone.param.set_param_float("MPC_XY_CRUISE", 3.25)
-        assert await drone.param.get_param_float("MPC_XY_CRUISE") == 3.25
-        await drone.param.set_param_int("NAV_DLL_ACT", 1)
-        assert await drone.param.get_param_int("NAV_DLL_ACT") == 1
-        for wrong in (drone.param.set_param_float("MPC_XY_CRUISE", 1e6), drone.param.get_param_float("NO_SUCH")):
-            with pytest.raises(ParamError):
-                await wrong
-        everything = await drone.param.get_all_params()
-        assert len(everything.float_params) + len(everything.int_params) > 30
-
-        await drone.telemetry.set_rate_attitude_euler(10.0)
-        stamps = []
-        async for attitude in drone.telemetry.attitude_euler():
-            stamps.append(attitude.timestamp_us * 1e-6)
-            if len(stamps) == 30:
-                break
-        gaps = [b - a for a, b in pairwise(stamps[5:])]
-        assert sum(gaps) / len(gaps) == pytest.approx(0.1, rel=0.1)  # simulated seconds
-
-        with pytest.raises(ActionError):  # the vehicle is on the ground
-            await drone.action.land()
-        await drone.action.arm()
-        stick = drone.manual_control.set_manual_control_input
-        await stick(0.0, 0.0, 0.5, 0.0)
-        await drone.manual_control.start_position_control()
-
-        async def push(forward, throttle, condition):
-            stream = drone.telemetry.position_velocity_ned()
-            looking = asyncio.ensure_future(first(stream, condition, 30.0))
-            while not looking.done():
-                await stick(forward, 0.0, throttle, 0.0)
-                await asyncio.sleep(0.05)
-            return looking.result()
-
-        await push(0.0, 0.9, lambda o: o.position.down_m < -2.0)
-        start = await push(0.0, 0.5, lambda o: abs(o.velocity.down_m_s) < 0.1)
-        # the vehicle faces east
-        await push(0.6, 0.5, lambda o: o.position.east_m > start.position.east_m + 4.0)
-        reported = asyncio.ensure_future(first(drone.telemetry.status_text(), lambda s: "denied" in s.text))
-        await asyncio.sleep(0.3)
-        with pytest.raises(ActionError):
-            await drone.action.disarm()
-        assert "Disarming denied: not landed" in (await reported).text
-        await drone.action.land()
-        await first(drone.telemetry.armed(), lambda armed: not armed)
-
-    # MAVSDK may pause for longer on a busy machine
-    session(tmp_path, "test-mavsdk-sticks", story, "autopilot.parameters.COM_RC_LOSS_T=35")
+def test_example_of_guide_flies(tmp_path):
+    port = free_port()
+    command = [sys.executable, "-m", "lapwing", "run", SCENE, "--key-prefix", "example", "--speed", f"{SPEED:g}"]
+    command += ["--mavlink", f"udpout:127.0.0.1:{port}", "--log", str(tmp_path / "example.mcap")]
+    script = [sys.executable, "examples/mavsdk_flight.py", f"udpin://127.0.0.1:{port}"]
+    with subprocess.Popen(command, stdout=subprocess.DEVNULL) as process:
+        try:
+            done = subprocess.run(script, stdout=subprocess.PIPE, text=True, timeout=END, check=True)
+        finally:
+            process.send_signal(signal.SIGTERM)
+    assert done.stdout.splitlines()[1:] == ["10 m north", "landed and disarmed"]

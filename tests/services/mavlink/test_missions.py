@@ -9,7 +9,8 @@ from lapwing.messages import CommandAck, CommandAcks, MissionItem, OperatorComma
 from lapwing.messages.topics import COMMAND_ACKS, OPERATOR
 from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.common.mavlink.mission_export import to_mavlink
-from lapwing.services.mavlink.mission_import import from_mavlink
+from lapwing.services.common.plans.converter import convert
+from lapwing.services.mavlink.mission_store import plan_items
 
 NAN = math.nan
 
@@ -30,6 +31,8 @@ ITEMS = [
     item("return"),
     item("loiter", 10.0, 20.0, 5.0, yaw=0.5),
     item("loiter_to_alt", 10.0, 20.0, 50.0),
+    item("orbit", 10.0, 20.0, 50.0, radius=8.0, values=(-4.0, NAN, NAN)),
+    item("orbit", 10.0, 20.0, 50.0, radius=8.0, values=(4.0, 2.0, 3.0)),
     item("roi", 10.0, 20.0, 5.0),
     item("roi"),
     item("set_home", 1.0, 2.0, 0.5),
@@ -38,6 +41,7 @@ ITEMS = [
     item("condition", hold=3.0),
     item("condition", radius=8.0),
     item("yaw", yaw=-0.5, values=(1.0,)),
+    item("yaw", yaw=-0.5, values=(0.0, 1.0)),
     item("speed", values=(NAN,)),
     item("land", 3.0, 4.0, 0.0, yaw=0.0),
 ]
@@ -58,19 +62,22 @@ def test_mission_upload_and_download_are_equal(items, kind):
         "land",
         "loiter",
         "loiter_to_alt",
+        "orbit",
         "roi",
         "set_home",
         "rally",
         *[i.action for i in FENCE],
     )
     datum = Datum(home_z=0.35)
-    for before, after in zip(items, from_mavlink(to_mavlink(items, kind, datum), False, datum), strict=True):
+    for before, after in zip(
+        items, convert(plan_items(to_mavlink(items, kind, datum), False), kind, datum), strict=True
+    ):
         assert after.action == before.action
         if before.action in places:
             assert tuple(after.position) == pytest.approx(tuple(before.position), abs=0.02, nan_ok=True)  # 1e-7 degrees
         for name in ("yaw", "radius", "hold_time"):
             assert getattr(after, name) == pytest.approx(getattr(before, name), abs=1e-6, nan_ok=True), before.action
-        assert after.values == pytest.approx(before.values, nan_ok=True)
+        assert after.values == pytest.approx(before.values, rel=1e-6, nan_ok=True)
 
 
 def external_command(bench, time_ns, command, result):

@@ -87,6 +87,7 @@ def station(tmp_path, request):
     result.link.close()
 
 
+@pytest.mark.nightly
 def test_satellites_of_simulated_gps_decide_fix_and_arming(station):
     station.receive("GPS_RAW_INT", lambda m: m.fix_type >= mavlink.GPS_FIX_TYPE_3D_FIX)
     assert station.set("SIM_GPS_USED", 3) == 3
@@ -99,6 +100,7 @@ def test_satellites_of_simulated_gps_decide_fix_and_arming(station):
     station.receive("SYS_STATUS", lambda m: m.onboard_control_sensors_health & gps)
 
 
+@pytest.mark.nightly
 def test_address_and_type_of_vehicle_are_set(station):
     armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
     assert station.set("MAV_TYPE", mavlink.MAV_TYPE_HEXAROTOR) == mavlink.MAV_TYPE_HEXAROTOR
@@ -121,6 +123,7 @@ def test_address_and_type_of_vehicle_are_set(station):
     assert (message.get_srcSystem(), message.param_value) == (42, 4.0)
 
 
+@pytest.mark.nightly
 def test_arming_does_not_require_optional_sensor(station):
     arm = mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0
     ready = mavlink.MAV_SYS_STATUS_PREARM_CHECK
@@ -145,6 +148,24 @@ def test_autopilot_without_gps_rejects_arming(station):
     assert station.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0) != mavlink.MAV_RESULT_ACCEPTED
 
 
+@pytest.mark.nightly
+def test_vehicle_lands_after_loss_of_link_and_by_command(station):
+    """Three flights: the station sends no heartbeat after its first, LAND, and RTL, which is overhead."""
+    armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    station.take_off()
+    assert station.set("NAV_DLL_ACT", 2) == 2  # return; in flight, because the link is lost already
+    station.receive("HEARTBEAT", lambda m: not m.base_mode & armed)
+    assert station.set("NAV_DLL_ACT", 0) == 0
+    for number in (mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH):
+        station.take_off()
+        assert station.command(number) == mavlink.MAV_RESULT_ACCEPTED
+        station.receive("HEARTBEAT", lambda m: not m.base_mode & armed)
+        station.receive("EXTENDED_SYS_STATE", lambda m: m.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND)
+    place = station.receive("LOCAL_POSITION_NED")
+    assert math.dist((place.x, place.y, place.z), (0.0, 0.0, 0.0)) < 1.0
+
+
+@pytest.mark.nightly
 @pytest.mark.parametrize("station", [["--set", "effects.payload_release={}"]], indirect=True)
 def test_disabled_gripper_fails(station):
     release = mavlink.MAV_CMD_DO_GRIPPER, 1.0, mavlink.GRIPPER_ACTION_RELEASE
@@ -155,6 +176,7 @@ def test_disabled_gripper_fails(station):
     assert station.command(*release) == mavlink.MAV_RESULT_ACCEPTED
 
 
+@pytest.mark.nightly
 def test_detection_of_motor_failures_is_switched_in_flight(station):
     critical, armed = mavlink.MAV_STATE_CRITICAL, mavlink.MAV_MODE_FLAG_SAFETY_ARMED
     assert station.set("FD_ACT_EN", 0) == 0

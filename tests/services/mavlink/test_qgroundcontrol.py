@@ -27,7 +27,7 @@ class QGroundControl(Station):
     """Buttons of QGroundControl: each sends its messages and returns the displayed result."""
 
     def step(self):
-        if self.bench.graph.tick % 250 < 10:
+        if self.bench.diagram.tick % 250 < 10:
             self.send("heartbeat", 6, 8, 0, 0, 0, 3)
 
     def newest(self, kind):

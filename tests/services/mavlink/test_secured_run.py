@@ -94,10 +94,7 @@ def test_signing_client_flies_and_replayed_frames_are_rejected(tmp_path, key):
     assert "unsigned, forged or replayed" in text
     assert {"arm", "takeoff"} <= commands(process.log)
 
-    with (
-        run(tmp_path, "replayed", *options) as process,
-        socket.socket(type=socket.SOCK_DGRAM) as thief,
-    ):
+    with run(tmp_path, "replayed", *options) as process, socket.socket(type=socket.SOCK_DGRAM) as thief:
         thief.connect(("127.0.0.1", port))
         observer = Station(f"udpout:127.0.0.1:{port}", key)
         observer.link.mav.srcComponent = 77  # a separate stream
@@ -109,6 +106,7 @@ def test_signing_client_flies_and_replayed_frames_are_rejected(tmp_path, key):
     assert commands(process.log) <= {"link"}
 
 
+@pytest.mark.nightly
 def test_http_post_to_tcp_link_is_closed_and_does_not_arm(tmp_path):
     port = free_port(socket.SOCK_STREAM)
     codec = mavlink.MAVLink(None, 255, 190)
@@ -139,7 +137,9 @@ def test_command_before_heartbeat_is_denied(tmp_path):
         assert silent.command(ARM, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
 
 
-@pytest.mark.parametrize("kind", ["mavlink", "foxglove", "ros2", "time stamps"])
+@pytest.mark.parametrize(
+    "kind", ["mavlink", *(pytest.param(k, marks=pytest.mark.nightly) for k in ("foxglove", "ros2", "time stamps"))]
+)
 def test_link_that_cannot_start_ends_run_before_take_off(tmp_path, key, kind):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         address = f"127.0.0.1:{taken.getsockname()[1]}"

@@ -4,7 +4,7 @@ import queue
 import selectors
 import socket
 
-from lapwing.services.mavlink.socket_watch import SocketWatch
+from lapwing.services.mavlink.service import SocketWatch
 
 
 def test_watch_wakes_once_until_resumed():

@@ -203,14 +203,14 @@ def test_acknowledgement_is_repeated_for_repeated_item():
 @pytest.mark.parametrize(
     ("changed", "result"),
     [
-        ({"command": 18}, mavlink.MAV_MISSION_UNSUPPORTED),
+        ({"command": 23}, mavlink.MAV_MISSION_UNSUPPORTED),
         ({"frame": 1}, mavlink.MAV_MISSION_UNSUPPORTED_FRAME),
         ({"up": float("nan")}, mavlink.MAV_MISSION_INVALID_PARAM7),
         ({"up": float("inf")}, mavlink.MAV_MISSION_INVALID),
         ({"north": 1e7}, mavlink.MAV_MISSION_INVALID_PARAM5_X),
         ({"params": (-1.0, 0.0, 0.0, 0.0)}, mavlink.MAV_MISSION_INVALID_PARAM1),
         ({"params": (float("inf"), 0.0, 0.0, 0.0)}, mavlink.MAV_MISSION_INVALID),
-        ({"command": 5001, "params": (2.0, 0.0, 0.0, 0.0)}, mavlink.MAV_MISSION_INVALID_PARAM1),
+        ({"command": 5001, "params": (3.0, 0.0, 0.0, 0.0)}, mavlink.MAV_MISSION_UNSUPPORTED),
     ],
 )
 def test_unsupported_item_keeps_old_mission(changed, result):
@@ -236,7 +236,10 @@ def test_camera_items_keep_their_index_without_effect():
         ("delay", 0.0),
         ("waypoint", 0.0),
     ]
-    assert [m.text for m in client.all("STATUSTEXT")] == ["item 1: IMAGE_START_CAPTURE skipped"]
+    assert [m.text for m in client.all("STATUSTEXT")] == [
+        "item 2, IMAGE_START_CAPTURE: skipped, the vehicle ",
+        "has no camera",
+    ]
 
 
 def test_clear_all_sends_single_acknowledgement():
@@ -294,16 +297,7 @@ def test_mavsdk_uploads_mission_over_lossy_udp():
         async for state in drone.core.connection_state():
             if state.is_connected:
                 break
-        items = [
-            mission_raw.MissionItem(
-                k,
-                *item(k)[3:5],
-                int(k == 0),
-                1,
-                *item(k)[7:],
-            )
-            for k in range(20)
-        ]
+        items = [mission_raw.MissionItem(k, *item(k)[3:5], int(k == 0), 1, *item(k)[7:]) for k in range(20)]
         await drone.mission_raw.upload_mission(items)
         down = await drone.mission_raw.download_mission()
         assert [(i.x, i.z) for i in down] == [(i.x, i.z) for i in items]

@@ -9,7 +9,7 @@ import pytest
 from pymavlink import mavutil
 
 from lapwing.cosim.scene import SceneError
-from lapwing.services.mavlink.stream_rates import Schedule
+from lapwing.services.mavlink.session import Schedule
 from lapwing.services.mavlink.telemetry.message_stream import STREAMS
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 from lapwing.services.scene_resolver import load, resolve
@@ -35,9 +35,9 @@ def scene(tmp_path, monkeypatch):
 
 
 def test_user_message_is_sent_at_its_rate(scene):
-    setup = resolve(scene(MODULE.replace("estimate and ", "")))
-    assert "@stream" in setup.modules["own_messages"]
-    vehicle = VehicleCache(setup.auxiliary["mavlink"])
+    config = resolve(scene(MODULE.replace("estimate and ", "")))
+    assert "@stream" in config.modules["own_messages"]
+    vehicle = VehicleCache(config.auxiliary["mavlink"])
     schedule, sent = Schedule(vehicle), 0
     for k in range(1000):  # 10 s
         vehicle.time_ns = k * 10_000_000

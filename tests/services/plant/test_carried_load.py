@@ -15,13 +15,16 @@ from tests.cosim.test_agreement import fly_apart
 
 pytestmark = pytest.mark.long
 
-COMMON = """
+COMMON = """  # the effects of the scene `carried_load`
 [run]
 duration = 7.0
 [effects.gravity]
+[effects.air_density]
 [effects.rotor_thrust]
 [effects.ground_contact]
 [effects.body_drag]
+[effects.wind_constant]
+velocity = [0.0, 0.0, 0.0]
 {load}
 [autopilot]
 gains = "tuned"
@@ -54,13 +57,13 @@ def two_carriers(tmp_path, *overrides):
 
 
 @pytest.fixture(scope="module")
-def setup(tmp_path_factory):
+def config(tmp_path_factory):
     return resolve(two_carriers(tmp_path_factory.mktemp("scene"), "trajectory.phase.0.x.to=0.0"))
 
 
 @pytest.fixture(scope="module")
-def recorded_flight(setup):
-    return fly(setup)
+def recorded_flight(config):
+    return fly(config)
 
 
 def test_one_carrier_equals_slung_load_model(tmp_path):
@@ -105,8 +108,8 @@ def test_static_cables_carry_weight(recorded_flight):
 
 def test_strictest_accuracy_keeps_load_substeps_above_round_off(tmp_path):
     """At the tolerance of the vehicles round-off would reject every substep: a communication step would not end."""
-    setup = resolve(two_carriers(tmp_path, "solver.accuracy=1e-12", "solver.step=0.001"))
-    plants = [config.parameters for config in setup.services["plant"].parameters.given]
+    config = resolve(two_carriers(tmp_path, "solver.accuracy=1e-12", "solver.step=0.001"))
+    plants = [settings.parameters for settings in config.services["plant"].parameters.given]
     assert [plant.core.vehicle.tolerance for plant in plants] == [1e-15, 1e-15]
     assert [plant.others.load.tolerance for plant in plants if plant.others.load] == [LEAST_TOLERANCE]
 
@@ -116,13 +119,13 @@ def test_first_carrier_publishes_load(recorded_flight):
     assert "right/body_states" not in recorded_flight.topics
 
 
-def test_carried_load_is_equal_with_diagram_per_service(setup, recorded_flight):
-    assert fly_apart(setup, None).digest == recorded_flight.digest
+def test_carried_load_is_equal_with_diagram_per_service(config, recorded_flight):
+    assert fly_apart(config, None).digest == recorded_flight.digest
 
 
-def test_configuration_survives_json(setup):
-    assert first_difference(from_json(to_json(setup)), setup) is None
-    assert first_difference(resolve(from_resolved(setup.resolved, "two")), setup) is None
+def test_configuration_survives_json(config):
+    assert first_difference(from_json(to_json(config)), config) is None
+    assert first_difference(resolve(from_resolved(config.resolved, "two")), config) is None
 
 
 @pytest.mark.parametrize(
@@ -146,8 +149,8 @@ def test_invalid_shared_load_is_rejected(tmp_path, override, message):
 
 
 def test_shipped_scene_lifts_load(tmp_path):
-    setup = resolve(load("carried_load", ["run.duration=14.0"]))
-    log = fly(setup)
+    config = resolve(load("carried_load", ["run.duration=14.0"]))
+    log = fly(config)
     reported = log.view("left/body_states")
     assert math.isclose(reported.position[0, 0, 2], 0.0)
     assert reported.position[-1, 0, 2] > 2.5

@@ -15,8 +15,9 @@ STANDING = {
     "run.duration": 1.0,
     **ASKED,
 }  # never armed
-CALM_MISSION = {  # effects of the delivery mission, whose bodies are compiled for other tests, without its wind
+CALM_MISSION = {  # the plant of the delivery mission (tests/combinations.py) without its wind
     "effects.air_density": {},
+    "effects.gyroscopic_torque": {},
     "effects.random_wind_force": {"mean": [0.0, 0.0, 0.0], "sigma": 0.0},
 }
 

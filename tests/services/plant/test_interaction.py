@@ -9,10 +9,11 @@ from lapwing.services.scene_resolver import from_resolved, parse, reseed, resolv
 from tests.cosim.memory_log import fly
 from tests.cosim.test_agreement import fly_apart
 
-SCENE = """
+SCENE = """  # the effects of the scene `formation`
 [run]
 duration = 4.0
 [effects.gravity]
+[effects.air_density]
 [effects.rotor_thrust]
 [effects.axial_inflow]
 [effects.body_drag]
@@ -49,13 +50,13 @@ def scene(tmp_path, *overrides):
 
 
 @pytest.fixture(scope="module")
-def setup(tmp_path_factory):
+def config(tmp_path_factory):
     return resolve(scene(tmp_path_factory.mktemp("scene")))
 
 
 @pytest.fixture(scope="module")
-def recorded_flight(setup):
-    return fly(setup)
+def recorded_flight(config):
+    return fly(config)
 
 
 @pytest.mark.long
@@ -69,29 +70,29 @@ def test_downwash_acts_only_below(recorded_flight):
 
 
 @pytest.mark.long
-def test_interaction_is_equal_with_diagram_per_service(setup, recorded_flight):
-    assert fly_apart(setup, None).digest == recorded_flight.digest
+def test_interaction_is_equal_with_diagram_per_service(config, recorded_flight):
+    assert fly_apart(config, None).digest == recorded_flight.digest
 
 
 @pytest.mark.long
-def test_isolated_vehicle_equals_flight_without_effects(tmp_path, setup):
+def test_isolated_vehicle_equals_flight_without_effects(tmp_path, config):
     """Without downwash and contact the flights are bit-for-bit those without interactions."""
     far = ["vehicle.1.initial_position=[0.0, 500.0]", "run.duration=1.0"]
     there = fly(resolve(scene(tmp_path, *far)))
     alone = fly(
-        members(resolve(scene(tmp_path, *far)))[1]._replace(services=_without_interaction(setup, tmp_path, far))
+        members(resolve(scene(tmp_path, *far)))[1]._replace(services=_without_interaction(config, tmp_path, far))
     )
     assert there.payloads("below/ground_truth") == alone.payloads("ground_truth")
 
 
-def _without_interaction(setup, tmp_path, far):
+def _without_interaction(config, tmp_path, far):
     return resolve(scene(tmp_path, *far).vehicles[1]).services
 
 
-def test_configuration_survives_json_and_reseed(setup, tmp_path):
-    assert first_difference(from_json(to_json(setup)), setup) is None
-    assert first_difference(resolve(from_resolved(setup.resolved, "two")), setup) is None
-    assert first_difference(reseed(setup, 7), resolve(scene(tmp_path, "run.seed=7"))) is None
+def test_configuration_survives_json_and_reseed(config, tmp_path):
+    assert first_difference(from_json(to_json(config)), config) is None
+    assert first_difference(resolve(from_resolved(config.resolved, "two")), config) is None
+    assert first_difference(reseed(config, 7), resolve(scene(tmp_path, "run.seed=7"))) is None
 
 
 @pytest.mark.long
@@ -99,7 +100,8 @@ def test_colliding_vehicles_bounce(tmp_path):
     meeting = fly(resolve(scene(tmp_path, "vehicle.0.trajectory.phase.0.z.to=1.0")))
     a, b = (meeting.view(f"{name}/ground_truth").position for name in ("above", "below"))
     gap = np.linalg.norm(a - b, axis=1)
-    radius = resolve(scene(tmp_path).vehicles[0]).services["plant"].parameters.core.vehicle.effects[1].radius
+    effects = resolve(scene(tmp_path).vehicles[0]).services["plant"].parameters.core.vehicle.effects
+    (radius,) = (effect.radius for effect in effects if hasattr(effect, "radius"))
     assert gap.min() == pytest.approx(2.0 * radius, rel=0.02)
     assert b[-1, 1] > 3.1  # pushed aside
 

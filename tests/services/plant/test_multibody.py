@@ -11,6 +11,7 @@ from lapwing.cosim.scene import SceneError
 from lapwing.messages.topics import BODIES, TRUTH
 from lapwing.services.common.ports import MotorCommand
 from lapwing.services.scene_resolver import load
+from tests.combinations import rest_nightly
 from tests.cosim.service_harness import Alone
 
 pytestmark = pytest.mark.long
@@ -67,7 +68,7 @@ def test_propeller_failures_in_flight():
     assert bodies.torque[2].z == pytest.approx(0.0, abs=1e-9)
 
 
-@pytest.mark.parametrize("coordinates", ["se3", "euler"])
+@pytest.mark.parametrize("coordinates", rest_nightly("se3", "euler"))
 def test_failure_between_ticks_acts_at_its_own_time(coordinates):
     """A failure half a tick later changes half of the impulse; two failures in one tick act in sequence."""
     failures = [[event(time, 1, "locked"), event(0.103, 2, "torn_off")] for time in (0.1, 0.102, 0.104)]
@@ -85,6 +86,7 @@ def test_failure_between_ticks_acts_at_its_own_time(coordinates):
     assert [f.rotor_speed[1] for f in flight] == [0.0, 0.0, 0.0]
 
 
+@pytest.mark.nightly
 def test_pitch_of_90_degrees_ends_only_euler_angles():
     """Only two rotors on one side run after a climb; the divisor of the Euler rates is checked before the division."""
 

@@ -7,11 +7,7 @@ import lapwing
 
 pytestmark = pytest.mark.long
 
-STANDING = {
-    "autopilot.accept_commands": True,
-    "autopilot.follow_trajectory": False,
-    "run.duration": 0.2,
-}  # never armed
+STANDING = {"autopilot.accept_commands": True, "autopilot.follow_trajectory": False, "run.duration": 0.2}  # never armed
 UNEVEN = [[0.20, 0.25, -0.30], [-0.20, 0.20, -0.35], [-0.20, -0.25, -0.36], [0.25, -0.25, -0.32]]
 CASES = {
     "level": {},

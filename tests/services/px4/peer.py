@@ -6,7 +6,9 @@ answers every HIL_SENSOR of instance 0 with the outputs of that time.
 
 import math
 import socket
+import struct
 import time
+from contextlib import suppress
 
 from pymavlink.dialects.v20 import all as mavlink
 
@@ -48,7 +50,9 @@ class Px4Peer:
                 if message.get_type() == kind:
                     return message
                 self.skipped.append(message)
-            data = self._socket.recv(65536)
+            data = b""
+            with suppress(ConnectionResetError):
+                data = self._socket.recv(65536)
             if not data:
                 return None
             self._waiting = self.codec.parse_buffer(data) or []
@@ -76,8 +80,10 @@ class Px4Peer:
             self.answer(message.time_usec, controls(message))
         return result
 
-    def close(self):
-        """Close the connection."""
+    def close(self, resets=False):
+        """Close the connection; True: by a reset, after which the system has forgotten its address."""
+        if resets:
+            self._socket.setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, struct.pack("ii", 1, 0))
         self._socket.close()
 
 

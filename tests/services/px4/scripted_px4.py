@@ -1,8 +1,8 @@
 """Scripted replacement of PX4 for complete runs: accepts a mission, arms, climbs to 2 m, descends and disarms.
 
-Started as `python scripted_px4.py -i INSTANCE`. With `--stall` it stops answering in flight; with `--starts
-FILE` it appends its instance and process id to a file. With `--cores FILE` it writes, in flight, the cores of its
-thread and of each thread of its parent process.
+Started as `python scripted_px4.py -i INSTANCE`. With `--stall` it stops answering in flight; with `--stop` it is halted
+there for 3 s. With `--starts FILE` it appends its instance and process id to a file. With `--cores FILE` it writes, in
+flight, the cores of its thread and of each thread of its parent process.
 """
 
 import argparse
@@ -16,6 +16,7 @@ sys.path.insert(0, str(Path(__file__).parents[3]))
 from pymavlink.dialects.v20 import all as mavlink
 
 from tests.services.px4.peer import Px4Peer
+from tests.services.stopped import stop_for
 
 HOVER, HEIGHT = 0.62, 2.0  # duty in hover; [m]
 
@@ -83,6 +84,7 @@ def main():
     parser = argparse.ArgumentParser()
     parser.add_argument("-i", type=int)
     parser.add_argument("--stall", action="store_true")
+    parser.add_argument("--stop", action="store_true")
     parser.add_argument("--starts", type=Path)
     parser.add_argument("--cores", type=Path)
     options = parser.parse_args()
@@ -114,6 +116,9 @@ def main():
             if options.cores and elapsed > 3.0:
                 report_cores(options.cores)
                 options.cores = None
+            if options.stop and elapsed > 3.0:
+                options.stop = False
+                stop_for(3.0)
             if options.stall and elapsed > 3.0:
                 peer.receive("NEVER")
         peer.answer(time_us, (duty,) * 4)

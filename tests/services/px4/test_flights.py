@@ -1,75 +1,72 @@
-"""Complete runs with PX4 as the autopilot: a scripted program, and the real one if LAPWING_PX4 is set."""
+"""Complete runs with PX4 as the autopilot: a scripted program, and the real one if PX4 is set."""
 
-import json
 import os
-import socket
-import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from lapwing.api.flight import Flight
 from lapwing.cosim.log import LogReader
 from lapwing.cosim.scene.scene_error import SceneError
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.services.px4.connection import MAVLINK_PORT, PORT
 from lapwing.services.scene_resolver import load, resolve
-from tests.services.firmware_links import free_instance
+from tests.services.firmware_links import fly, lapwing, scripted
 
-PEER = Path(__file__).parent / "scripted_px4.py"
 SCENE = Path(__file__).parents[3] / "lapwing/scenes/px4_quad.toml"
-
-
-def run(command, *options, timeout=600):
-    """Run the scene with a program as PX4."""
-    instance = free_instance((socket.SOCK_STREAM, PORT, 1), (socket.SOCK_DGRAM, MAVLINK_PORT, 1))
-    arguments = [sys.executable, "-m", "lapwing", "run", "px4_quad", "--mode", "single-process"]
-    arguments += ["--set", f"autopilot.command={json.dumps(command)}", "--set", f"autopilot.instance={instance}"]
-    return subprocess.run([*arguments, *options], capture_output=True, text=True, timeout=timeout)
+COUNTS = "skew 0 ms, resent 0, late 0, missed 0, rejected 0"
 
 
 @pytest.mark.long
 def test_scripted_firmware_flies_and_resimulates(tmp_path):
     log = tmp_path / "flight.mcap"
-    result = run([sys.executable, str(PEER)], "--log", str(log))
-    assert result.returncode == 0, result.stdout + result.stderr
+    fly("px4", scripted("px4"), "--log", log)
     with LogReader(log) as reader:
         report = reader.metadata["firmware"]
     assert report.startswith("px4: ")
-    assert "skew 0 ms, resent 0, late 0, missed 0, rejected 0" in report
-    again = subprocess.run([sys.executable, "-m", "lapwing", "resimulate", str(log)], capture_output=True, text=True)
-    assert again.returncode == 0, again.stdout + again.stderr
+    assert COUNTS in report
+    lapwing("resimulate", log)
 
 
 @pytest.mark.long
 def test_stalled_firmware_is_reported_and_log_readable(tmp_path):
     log = tmp_path / "flight.mcap"
-    result = run([sys.executable, str(PEER), "--stall"], "--log", str(log), "--set", "autopilot.step_timeout=2.0")
-    assert result.returncode != 0
+    result = fly("px4", scripted("px4", "--stall"), "--log", log, "--set", "autopilot.step_timeout=2.0", code=1)
     assert "px4: no HIL_ACTUATOR_CONTROLS for 2 s at t = " in result.stderr
-    assert "Traceback" not in result.stderr
     with LogReader(log) as reader:
         times, _ = reader.history("/drone1/ground_truth")
     assert times[-1] > 2_000_000_000
 
 
 @pytest.mark.long
+def test_stopped_firmware_loses_no_step(tmp_path):
+    assert COUNTS in fly("px4", scripted("px4", "--stop"), "--log", tmp_path / "flight.mcap").stdout
+
+
+@pytest.mark.long
 def test_missing_program_is_reported(tmp_path):
-    log = tmp_path / "flight.mcap"
-    result = run(["/nowhere/px4"], "--log", str(log))
-    assert result.returncode == 2
+    result = fly("px4", ["/nowhere/px4"], "--log", tmp_path / "a.mcap", code=2)
     assert "autopilot.command: cannot start /nowhere/px4; expected path of a program" in result.stderr
-    assert "Traceback" not in result.stderr
-    assert not log.exists()
+    assert not (tmp_path / "a.mcap").exists()
 
 
 @pytest.mark.long
 def test_missing_working_directory_is_reported(tmp_path):
-    result = run(
-        [sys.executable], "--set", f"autopilot.directory={tmp_path}/nowhere", "--log", str(tmp_path / "a.mcap")
-    )
-    assert result.returncode == 2
+    folder = "--set", f"autopilot.directory={tmp_path}/nowhere"
+    result = fly("px4", [sys.executable], *folder, "--log", tmp_path / "a.mcap", code=2)
     assert "autopilot.directory: no folder" in result.stderr
+
+
+def test_delays_of_sensors_are_parameters_of_firmware():
+    def parameters(*overrides):
+        return resolve(load("px4_quad", overrides)).services["px4"].parameters.own.parameters
+
+    assert parameters("sensors.barometer.latency_samples=2").items() >= {
+        "SENS_GPS0_DELAY": 100.0, "EKF2_BARO_DELAY": 40.0, "EKF2_MAG_DELAY": 0.0, "IMU_INTEG_RATE": 250.0,
+        "EKF2_DELAY_MAX": 200.0, "SIM_BAT_ENABLE": 0.0,
+    }.items()  # fmt: skip
+    assert parameters("sensors.gps.latency_samples=3")["EKF2_DELAY_MAX"] == 300.0
 
 
 def test_missing_sensor_is_rejected(tmp_path):
@@ -82,23 +79,51 @@ def test_missing_sensor_is_rejected(tmp_path):
 def test_invalid_mission_is_rejected(tmp_path):
     (tmp_path / "bad.plan").write_text("{}")
     (tmp_path / "scene.toml").write_text(SCENE.read_text().replace("plans/square_px4.plan", "bad.plan"))
-    checked = subprocess.run(
-        [sys.executable, "-m", "lapwing", "check", str(tmp_path / "scene.toml")], capture_output=True, text=True
-    )
-    assert checked.returncode == 2
-    assert "px4.mission" in checked.stderr
-    assert "Traceback" not in checked.stderr
+    assert "px4.mission" in lapwing("check", tmp_path / "scene.toml", code=2).stderr
 
 
 @pytest.mark.long
-@pytest.mark.skipif("LAPWING_PX4" not in os.environ, reason="LAPWING_PX4 names no px4 program")
+@pytest.mark.skipif("PX4" not in os.environ, reason="PX4 names no px4 program")
 def test_px4_flies_its_square(tmp_path):
-    log, binary = tmp_path / "flight.mcap", Path(os.environ["LAPWING_PX4"]).resolve()
+    log, binary = tmp_path / "flight.mcap", Path(os.environ["PX4"]).resolve()
     command = [str(binary), "-d", str(binary.parents[1] / "etc")]
     environment = 'autopilot.environment={PX4_SIM_MODEL = "none_iris"}'
     links = "autopilot.instance=8"  # missions go to instances 0 to 9 only
-    result = run(command, "--log", str(log), "--set", environment, "--set", links)
-    assert result.returncode == 0, result.stdout + result.stderr
+    result = fly("px4", command, "--log", log, "--set", environment, "--set", links)
     assert "Landed" in result.stdout
     with LogReader(log) as reader:
         assert "skew 0 ms" in reader.metadata["firmware"]
+    assert abs(lag_of_estimate(tmp_path / "flight.px4.ulg", log)) < 0.02
+
+
+def lag_of_estimate(ulog, log):
+    """Return the time [s] by which PX4's estimated path is behind the true one."""
+    from pyulog import ULog
+
+    (estimate,) = ULog(str(ulog), ["vehicle_local_position"]).data_list
+    truth = Flight.read(log).truth
+    x, y = estimate.data["y"], estimate.data["x"]  # NED
+    return lag(1e-6 * estimate.data["timestamp_sample"], np.stack([x, y], 1), truth.times, truth.position[:, :2])
+
+
+def lag(times, path, true_times, true_path):
+    """Return the delay [s] of a path, whose clock is a whole number of seconds ahead of the true one's."""
+    speed = np.abs(np.diff(path, axis=0)).sum(axis=1) / np.diff(times)
+    moving = np.append(speed > 0.5, False)
+    times, path = times[moving], path[moving]
+
+    def error(delay):
+        expected = [np.interp(times - delay, true_times, values) for values in true_path.T]
+        return np.square(path - np.stack(expected, 1) - (path - np.stack(expected, 1)).mean(axis=0)).sum()
+
+    second = min(range(240), key=error)
+    return min(np.arange(-0.5, 0.5, 0.005), key=lambda delay: error(second + delay))
+
+
+def test_lag_of_path_is_measured():
+    t = np.arange(0.0, 20.0, 0.02)
+
+    def path(time):
+        return np.stack([5.0 * np.sin(0.5 * time), 3.0 * np.cos(0.3 * time)], 1)
+
+    assert lag(t + 7.0, path(t - 0.095) + 1.0, t, path(t)) == pytest.approx(0.095, abs=0.006)

@@ -10,17 +10,16 @@ import pytest
 from pymavlink.dialects.v20 import all as mavlink
 
 from lapwing.services.common import ports
-from lapwing.services.common.firmware.link import FirmwareError
+from lapwing.services.common.firmware.program import FirmwareError
 from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.common.ports import BarometerReading, BatteryReading, GpsReading, ImuReading, MagnetometerReading
-from lapwing.services.px4.connection import MAVLINK_PORT, PORT
-from lapwing.services.px4.link import Px4Link
-from lapwing.services.px4.resolve import Px4Setup
-from tests.services.firmware_links import Background, Exchange, firmware_setup, free_instance, never
+from lapwing.services.px4.link import MAVLINK_PORT, PORT, Px4Link
+from lapwing.services.px4.resolve import Px4Config
+from tests.services.firmware_links import Background, link_with, never
 from tests.services.px4.peer import Px4Peer, finite
 
 PERIODS = {ports.IMU: 1, ports.MAGNETOMETER: 5, ports.BAROMETER: 5, ports.GPS: 25}
-OWN = Px4Setup(Datum(), PERIODS, (0.0, 0.0, 9.81), (1e-6, 2.4e-5, -3.9e-5), 98000.0)
+OWN = Px4Config(Datum(), PERIODS, (0.0, 0.0, 9.81), (1e-6, 2.4e-5, -3.9e-5), 98000.0, {})
 SAMPLES = {
     ports.IMU: ImuReading((0.1, 0.2, 0.3), (0.0, 0.0, 9.81), valid=True),
     ports.MAGNETOMETER: MagnetometerReading((2e-5, 1e-6, -4e-5), valid=True),
@@ -32,15 +31,13 @@ SAMPLES = {
 
 @pytest.fixture
 def link():
-    instance = free_instance((socket.SOCK_STREAM, PORT, 1), (socket.SOCK_DGRAM, MAVLINK_PORT, 1))
-    link = Px4Link(firmware_setup("px4", OWN, instance))
-    link.steps = Exchange(link, SAMPLES)
+    link = link_with(Px4Link, OWN, SAMPLES)
     yield link
     link.close()
 
 
 def port_of(link):
-    return PORT + link._setup.instance
+    return PORT + link._config.instance
 
 
 def fly(link, steps, first=0, samples=SAMPLES):
@@ -61,6 +58,12 @@ def begin(link, script):
     return background
 
 
+def flight(link, script, steps):
+    """Run a script with a started peer during `steps`. Return the outputs, and the result of the script."""
+    background = begin(link, script)
+    return fly(link, steps), background.join()
+
+
 def at_start(peer):
     """Answer up to the first message of the run, which is a full second of PX4's clock; return this message."""
     while True:
@@ -77,9 +80,7 @@ def test_every_step_is_answered_with_its_time(link):
         peer.armed = True
         return first, peer.run(99, lambda message: (0.1, 0.2, 0.3, message.time_usec % 1_000_000 * 1e-6))
 
-    background = begin(link, script)
-    outputs = fly(link, 100)
-    first, rest = background.join()
+    outputs, (first, rest) = flight(link, script, 100)
     times = [message.time_usec - first.time_usec for message in rest]
     assert times == [4000 * k for k in range(1, 100)]
     assert [o.outputs[3] for o in outputs[1:]] == pytest.approx([0.004 * k for k in range(1, 100)])
@@ -162,9 +163,9 @@ def test_lost_imu_does_not_block(link):
 
 def test_program_end_during_imu_loss_is_reported(link):
     class Ended:
-        pid = None
+        pid, repeatable = 1, None
 
-        def check(self, when):
+        def check(self, when, starting):
             raise FirmwareError(f"px4: the program ended (signal 9){when}")
 
         def close(self):
@@ -174,9 +175,7 @@ def test_program_end_during_imu_loss_is_reported(link):
         at_start(peer)
         peer.close()
 
-    background = begin(link, script)
-    fly(link, 1)
-    background.join()
+    flight(link, script, 1)
     link._program = Ended()
     with pytest.raises(FirmwareError, match=r"the program ended \(signal 9\) at t = 0.0\d+ s"):
         fly(link, 20, 1, SAMPLES | {ports.IMU: ImuReading(valid=False)})
@@ -190,9 +189,7 @@ def test_missed_answer_is_counted_and_outputs_are_held(link):
         peer.receive()  # not answered
         peer.run(3, lambda _: (0.6,) * 4)
 
-    background = begin(link, script)
-    outputs = fly(link, 8)
-    background.join()
+    outputs, _ = flight(link, script, 8)
     assert [o.outputs[0] for o in outputs[1:]] == pytest.approx([0.5] * 4 + [0.6] * 3)
     assert link.report.missed == 1
 
@@ -206,15 +203,13 @@ def test_late_answer_is_counted(link):
         time.sleep(0.05)
         peer.answer(message.time_usec)
 
-    background = begin(link, script)
-    fly(link, 2)
-    background.join()
+    flight(link, script, 2)
     assert link.report.late >= 1
     assert link.report.missed == 0
 
 
 def test_stall_is_reported(link):
-    link._setup = link._setup._replace(step_timeout=2.0)
+    link._config = link._config._replace(step_timeout=2.0)
     background = begin(link, lambda peer: (peer, at_start(peer)))  # keep the connection
     with pytest.raises(FirmwareError, match=r"px4: no HIL_ACTUATOR_CONTROLS for 2 s at t = 0.008 s; check"):
         fly(link, 5)
@@ -222,31 +217,33 @@ def test_stall_is_reported(link):
 
 
 def test_absent_firmware_is_reported(link):
-    link._setup = link._setup._replace(start_timeout=0.5)
-    with pytest.raises(FirmwareError, match=r"px4: no connection for 0.5 s at t = 0.000 s; start px4 with"):
+    link._config = link._config._replace(start_timeout=0.5)
+    with pytest.raises(FirmwareError, match=r"px4: no connection for 0.5 s at its start; start px4 with"):
         link.open(never)
 
 
 def test_firmware_without_answers_is_reported(link):
-    link._setup = link._setup._replace(start_timeout=1.0)
+    link._config = link._config._replace(start_timeout=1.0)
     background = Background(lambda: (peer := Px4Peer(port_of(link)), peer.start()))
     with pytest.raises(FirmwareError, match=r"px4: no HIL_ACTUATOR_CONTROLS for 1 s"):
         link.open(never)
     background.join()
 
 
-def test_reconnect_keeps_time(link):
+@pytest.mark.parametrize("resets", [False, True])
+def test_reconnect_keeps_time(link, resets):
     def script(peer):
         first = at_start(peer)
         peer.run(5)
-        peer.close()
+        peer.close(resets)
         other = Px4Peer(port_of(link))
         message = other.start()
         other.answer(message.time_usec)
-        return first.time_usec, other.run(3)
+        return first.time_usec, other.run(10**6)  # messages of the start may still be on their way
 
     background = begin(link, script)
     fly(link, 10)
+    link.close()
     start, messages = background.join()
     assert link.report.reconnected == 1
     assert messages[0].time_usec > start + 6 * 4000
@@ -262,9 +259,7 @@ def test_second_firmware_is_rejected(link):
         with suppress(ConnectionResetError):
             assert other.recv(1) == b""
 
-    background = begin(link, script)
-    fly(link, 601)
-    background.join()
+    flight(link, script, 601)
     assert "a second PX4" in link.report.notes[0]
     assert link.report.rejected == 1
 
@@ -275,9 +270,7 @@ def test_garbage_is_counted(link):
         peer.send_bytes(b"GET / HTTP/1.0\r\n\r\n" + bytes(50))
         peer.run(5)
 
-    background = begin(link, script)
-    fly(link, 6)
-    background.join()
+    flight(link, script, 6)
     assert link.report.rejected >= 1
 
 
@@ -288,9 +281,7 @@ def test_non_finite_outputs_are_held(link):
         peer.run(1, lambda _: (0.5,) * 4)
         peer.run(1, lambda _: (math.nan,) * 4)
 
-    background = begin(link, script)
-    outputs = fly(link, 3)
-    background.join()
+    outputs, _ = flight(link, script, 3)
     assert outputs[2].outputs == (0.5,) * 4
     assert "non-finite outputs at t = 0.008 s" in link.report.notes[0]
 
@@ -310,16 +301,16 @@ def test_port_in_use_is_reported(link):
         link.open(never)
 
 
-def test_battery_of_scene_is_sent_to_firmware(link):
-    link._own = OWN._replace(battery=True)
-    samples = {**SAMPLES, ports.BATTERY: BatteryReading(0.42, 11.2, 20.0)}
+@pytest.mark.parametrize(("charge", "percent"), [(0.42, 42), (math.nan, 100)])
+def test_battery_of_plant_is_sent_to_firmware(link, charge, percent):
+    samples = {**SAMPLES, ports.BATTERY: BatteryReading(charge, 11.2, 20.0)}
     with socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as vehicle:
         vehicle.settimeout(20.0)
         codec = mavlink.MAVLink(None, srcSystem=3, srcComponent=1)
 
         def script(peer):
             beat = mavlink.MAVLink_heartbeat_message(2, 12, 1, 0, 4, 3)
-            vehicle.sendto(beat.pack(codec), ("127.0.0.1", MAVLINK_PORT + link._setup.instance))
+            vehicle.sendto(beat.pack(codec), ("127.0.0.1", MAVLINK_PORT + link._config.instance))
             peer.run(10**6)
 
         background = begin(link, script)
@@ -334,4 +325,4 @@ def test_battery_of_scene_is_sent_to_firmware(link):
                 events += codec.parse_buffer(vehicle.recv(4096)) or []
     states = [m for m in events if m.get_type() == "BATTERY_STATUS"]
     assert states
-    assert all((m.get_srcSystem(), m.battery_remaining, m.voltages[0]) == (3, 42, 11200) for m in states)
+    assert all((m.get_srcSystem(), m.battery_remaining, m.voltages[0]) == (3, percent, 11200) for m in states)

@@ -8,25 +8,23 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from lapwing.dynamics.environment import STANDARD
 from lapwing.kernels import kernel
-from lapwing.services.common.ports import GPS_FLOAT, GPS_RTK, GPS_SBAS, GPS_SINGLE, GpsReading
-from lapwing.services.px4.framing import frame
-from lapwing.services.px4.messages import (
-    HIL_ACTUATOR_CONTROLS,
-    HIL_GPS,
-    HIL_SENSOR,
-    actuator_controls,
-    gps_values,
-)
-from lapwing.services.px4.sensor_frame import Sensors, payload, pressure_altitude, read_controls, sensor_frame
-from tests.services.px4 import hil_sensor
+from lapwing.services.common.ports import GPS_FLOAT, GPS_RTK, GPS_SBAS, GPS_SINGLE, DistanceReading, GpsReading
+from lapwing.services.px4.messages import distance_message, gps_message
+from lapwing.services.px4.sensor_frame import Sensors, frame, pressure_altitude, read_controls, sensor_frame
 
 
 def sensor(time_us=4000, **readings):
     return mavlink.MAVLink(None).parse_buffer(sensor_frame(0, time_us, Sensors(**readings)))[0]
 
 
+def packed(message, sequence=0, component=1):
+    codec = mavlink.MAVLink(None, srcSystem=1, srcComponent=component)
+    codec.seq = sequence
+    return message.pack(codec)
+
+
 def gps(reading, time_us=4000):
-    return mavlink.MAVLink(None).parse_buffer(frame(HIL_GPS, 0, gps_values(time_us, reading), 1, 1))[0]
+    return mavlink.MAVLink(None).parse_buffer(packed(gps_message(time_us, reading)))[0]
 
 
 def test_level_at_rest_accelerates_up_in_frd():
@@ -60,8 +58,22 @@ def test_pressure_is_in_hectopascal():
     assert result.pressure_alt == pytest.approx(pressure_altitude(98000.0))
 
 
+def hil_sensor(time_us, **readings):
+    """Return HIL_SENSOR: FRD, gauss and hPa; id 0 sets PX4's clock."""
+    vectors = {"specific_force_body": (1.0, 0x7), "omega_body": (1.0, 0x38), "field_body": (1e4, 0x1C0)}
+    values, mask = [], 0
+    for name, (factor, bits) in vectors.items():
+        x, y, z = readings.get(name, (0.0, -0.0, -0.0))
+        values += [factor * x, -factor * y, -factor * z]
+        mask |= bits * (name in readings)
+    mask |= 0x1A00 * ("pressure" in readings) | 0x400 * ("dynamic_pressure" in readings)
+    altitude = pressure_altitude(readings["pressure"]) if "pressure" in readings else 0.0
+    pressures = [0.01 * readings.get(name, 0.0) for name in ("pressure", "dynamic_pressure")]
+    return mavlink.MAVLink_hil_sensor_message(time_us, *values, *pressures, altitude, 25.0, mask, 0)
+
+
 @pytest.mark.parametrize("seed", range(20))
-def test_compiled_frame_equals_struct_packing(seed):
+def test_compiled_frame_equals_pymavlink(seed):
     random = np.random.default_rng(seed)
     readings = {
         "omega_body": tuple(random.normal(size=3)),
@@ -72,9 +84,12 @@ def test_compiled_frame_equals_struct_packing(seed):
     }
     readings = {name: value for name, value in readings.items() if random.random() < 0.6}
     time_us, sequence = int(random.integers(2**50)), int(random.integers(256))
-    expected = hil_sensor.sensor_values(time_us, hil_sensor.Sensors(**readings))
     result = sensor_frame(sequence, time_us, Sensors(**readings))
-    assert result == frame(HIL_SENSOR, sequence, expected, 1, 51)
+    assert result == packed(hil_sensor(time_us, **readings), sequence, 51)
+
+
+def outputs(time_us, values, mode, flags=1):
+    return mavlink.MAVLink_hil_actuator_controls_message(time_us, values, mode, flags)
 
 
 @kernel
@@ -83,23 +98,21 @@ def controls(data, size, m):
 
 
 def test_compiled_reader_accepts_exactly_one_frame():
-    values = (2**40, 1, *np.linspace(0.0, 0.75, 16).tolist(), 129)
-    data = frame(HIL_ACTUATOR_CONTROLS, 7, values, 1, 1)
-    m = payload()
+    data, m = packed(outputs(2**40, np.linspace(0.0, 0.75, 16).tolist(), 129), 7), frame()
 
     def read(content):
         return controls(np.frombuffer(content + bytes(300), np.uint8).copy(), len(content), m)
 
     assert read(data)
-    assert (m.words[0], m.words[1], m.floats[4], m.floats[19], m.bytes[80]) == (2**40, 1, 0.0, 0.75, 129)
+    assert (m.words[0], m.words[1], m.floats[4], m.floats[19], m.bytes[90]) == (2**40, 1, 0.0, 0.75, 129)
     for k in range(len(data)):
         assert not read(data[:k] + bytes((data[k] ^ 1,)) + data[k + 1 :]), k
         assert not read(data[:k])
     assert not read(data + data)
     assert not read(b"")
-    short = frame(HIL_ACTUATOR_CONTROLS, 7, (5, 0, *(0.0,) * 16, 0), 1, 1)  # zeros at the end are not sent
+    short = packed(outputs(5, [0.0] * 16, 0, flags=0))  # zeros at the end are not sent
     assert read(short)
-    assert (m.words[0], m.floats[19], m.bytes[80]) == (5, 0.0, 0)
+    assert (m.words[0], m.floats[19], m.bytes[90]) == (5, 0.0, 0)
 
 
 @pytest.mark.parametrize(("pressure", "altitude"), [(101325.0, 0.0), (89874.6, 1000.0), (54019.9, 5000.0)])
@@ -158,11 +171,7 @@ def test_gps_outage_has_no_fix():
     assert (result.fix_type, result.satellites_visible, result.eph) == (0, 0, 65535)
 
 
-def test_actuator_controls_of_armed_vehicle():
-    values = (4000, 1, *np.linspace(0.0, 0.75, 16).tolist(), 129)
-    result = actuator_controls(values)
-    assert result.time_us == 4000
-    assert result.lock_step
-    assert result.armed
-    assert result.controls[15] == 0.75
-    assert not actuator_controls((4000, 0, *(0.0,) * 16, 1)).armed
+def test_distance_is_sent_unless_invalid():
+    assert distance_message(5000, DistanceReading(valid=False)) is None
+    result = mavlink.MAVLink(None).parse_buffer(packed(distance_message(5000, DistanceReading(1.25, valid=True))))[0]
+    assert (result.time_boot_ms, result.current_distance, result.orientation) == (5, 125, 25)

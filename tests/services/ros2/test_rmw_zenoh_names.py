@@ -9,7 +9,7 @@ from lapwing.messages import TYPES
 from lapwing.messages.attachment import pack
 from lapwing.messages.parse import dependencies
 from lapwing.messages.types import DEFINITIONS, FOLDER
-from lapwing.services.ros2.rmw_zenoh_names import PUBLISHER, SUBSCRIPTION, Endpoint, identifier, node_token
+from lapwing.services.ros2.node import PUBLISHER, SUBSCRIPTION, Endpoint, identifier, node_token
 
 SESSION = "5a16d9fcc7d8d7d0a7d6c4a6d2a4d1b8"
 

@@ -33,7 +33,7 @@ def port():
 
 
 @pytest.fixture
-def graph(port, tmp_path):
+def diagram(port, tmp_path):
     """Return publishers and subscribers of another program on a router; the first opens its session."""
     pytest.importorskip("zenoh_ros2_sdk", reason="needs the extra `clients`")
     from zenoh_ros2_sdk import message_registry
@@ -44,9 +44,9 @@ def graph(port, tmp_path):
         copy.parent.mkdir(parents=True, exist_ok=True)
         copy.write_text(path.read_text())
     message_registry.get_registry().messages_dir = tmp_path / "msg"
-    graph = Graph(port)
-    yield graph
-    for entity in graph.entities:
+    diagram = Graph(port)
+    yield diagram
+    for entity in diagram.entities:
         entity.close()
     if ZenohSession._instance is not None:
         ZenohSession._instance.session.close()
@@ -117,17 +117,17 @@ def plain(message):
     return message
 
 
-def test_ros_nodes_observe_and_command_run(tmp_path, port, graph):
+def test_ros_nodes_observe_and_command_run(tmp_path, port, diagram):
     run = fly(tmp_path, port, "--speed", "2", "--set", "run.duration=14")
     try:
-        clock, poses = graph.subscribe("/clock", Clock), graph.subscribe("/drone1/pose", PoseStamped)
-        arm, mode = graph.publisher("/drone1/command/arm", Bool), graph.publisher("/drone1/command/mode", String)
-        target = graph.publisher("/drone1/command/pose", PoseStamped)
-        events = graph.subscribe("/drone1/events", Log)
+        clock, poses = diagram.subscribe("/clock", Clock), diagram.subscribe("/drone1/pose", PoseStamped)
+        arm, mode = diagram.publisher("/drone1/command/arm", Bool), diagram.publisher("/drone1/command/mode", String)
+        target = diagram.publisher("/drone1/command/pose", PoseStamped)
+        events = diagram.subscribe("/drone1/events", Log)
         received = [poses.get(timeout=PATIENCE)]
-        topics = graph.topics()
+        topics = diagram.topics()
         there = received[0].pose.__class__(
-            graph.type_("geometry_msgs/msg/Point")(2.0, 1.0, 3.0), received[0].pose.orientation
+            diagram.type_("geometry_msgs/msg/Point")(2.0, 1.0, 3.0), received[0].pose.orientation
         )
         started = False
         while received[-1].header.stamp.sec < 13:
@@ -164,15 +164,15 @@ def test_ros_nodes_observe_and_command_run(tmp_path, port, graph):
     assert abs(position.z - 3.0) < 0.5
 
 
-def test_node_drives_motors(tmp_path, port, graph):
+def test_node_drives_motors(tmp_path, port, diagram):
     run = fly(tmp_path, port, "--speed", "1", "--set", "run.duration=12", "--set", "autopilot.estimator=ground_truth")
     try:
-        poses = graph.subscribe("/drone1/pose", PoseStamped)
-        arm, mode = graph.publisher("/drone1/command/arm", Bool), graph.publisher("/drone1/command/mode", String)
-        motors = graph.publisher("/drone1/command/motors", Actuators)
+        poses = diagram.subscribe("/drone1/pose", PoseStamped)
+        arm, mode = diagram.publisher("/drone1/command/arm", Bool), diagram.publisher("/drone1/command/mode", String)
+        motors = diagram.publisher("/drone1/command/motors", Actuators)
         volts, second = np.array([1.0, 1.5, 2.0, 2.5]), 0
         while (pose := poses.get(timeout=PATIENCE)).header.stamp.sec < 11:
-            none = graph.type_("geometry_msgs/msg/Vector3")(0.0, 0.0, 0.0)
+            none = diagram.type_("geometry_msgs/msg/Vector3")(0.0, 0.0, 0.0)
             motors.publish(header=pose.header, motor_voltage=volts, armed=False, thrust=volts, attitude_reference=none)
             if pose.header.stamp.sec > second:  # repeated, since the node may start late
                 second = pose.header.stamp.sec
@@ -190,15 +190,16 @@ def test_node_drives_motors(tmp_path, port, graph):
     assert np.all(recorded["motor_voltage"] == volts, axis=1).any()
 
 
-def test_ros_nodes_observe_fleet_and_command_one_vehicle(tmp_path, port, graph):
+@pytest.mark.nightly
+def test_ros_nodes_observe_fleet_and_command_one_vehicle(tmp_path, port, diagram):
     more = ["--speed", "1", "--set", "run.duration=8", "--set", "autopilot.accept_commands=true"]
     run = fly(tmp_path, port, *more, scene="fleet")
     try:
-        clock, events = graph.subscribe("/clock", Clock), graph.subscribe("/right/events", Log)
-        arm, mode = graph.publisher("/right/command/arm", Bool), graph.publisher("/right/command/mode", String)
+        clock, events = diagram.subscribe("/clock", Clock), diagram.subscribe("/right/events", Log)
+        arm, mode = diagram.publisher("/right/command/arm", Bool), diagram.publisher("/right/command/mode", String)
         topics, requested = {}, False
         while (now := clock.get(timeout=PATIENCE).clock).sec < 3:
-            topics = topics or graph.topics()
+            topics = topics or diagram.topics()
             if not requested and now.sec >= 1:
                 requested = True
                 mode.publish(data="hold")
@@ -221,7 +222,8 @@ def test_ros_nodes_observe_fleet_and_command_one_vehicle(tmp_path, port, graph):
     assert ("mode", "hold") in {(e.name, e.msg) for e in (events.get_nowait() for _ in range(events.qsize()))}
 
 
-def test_ros_nodes_observe_distributed_run(tmp_path, port, graph):
+@pytest.mark.nightly
+def test_ros_nodes_observe_distributed_run(tmp_path, port, diagram):
     sets = [
         "--set",
         "run.duration=8",
@@ -250,8 +252,8 @@ def test_ros_nodes_observe_distributed_run(tmp_path, port, graph):
         for name in names[:-1]:
             start("service", name, *options.get(name, []))
         run = start("run", *log)
-        clock, events = graph.subscribe("/clock", Clock), graph.subscribe("/drone1/events", Log)
-        arm, requested = graph.publisher("/drone1/command/arm", Bool), False
+        clock, events = diagram.subscribe("/clock", Clock), diagram.subscribe("/drone1/events", Log)
+        arm, requested = diagram.publisher("/drone1/command/arm", Bool), False
         while clock.get(timeout=PATIENCE).clock.sec < 3:
             if not requested:
                 requested = True

@@ -48,7 +48,7 @@ def sample(p, s, key, tick, truth):
     return State(s.samples + 1.0), AnemometerReading(speed, True)
 """
 ESTIMATOR = """
-from lapwing.services.common.estimator_api import StateEstimate
+from lapwing.services.autopilot.custom.estimator_api import StateEstimate
 
 class Echo:
     rate = 50.0
@@ -93,13 +93,13 @@ def test_custom_sensors_have_separate_topics(scene, tmp_path):
     values = scene(
         "sensors.height.module=own_height", "sensors.height.rate=25.0", "sensors.second.module=own_anemometer"
     )
-    setup, flight = resolve(values), lapwing.fly(values)
+    config, flight = resolve(values), lapwing.fly(values)
     speed, second, height = (flight.topic(f"custom_sensor/{name}") for name in ("anemometer", "second", "height"))
     assert (speed["values"] == second["values"]).all()
     assert height["values"][:, 0] == pytest.approx(flight.truth.position[::10, 2])
     assert set(height["sensor"]) == {"height"}
-    fly_single(setup, tmp_path / "single.mcap")
-    fly_processes(ProcessSpec("mission", setup, {}, "test-own-sensors", log=str(tmp_path / "own.mcap")), Silent())
+    fly_single(config, tmp_path / "single.mcap")
+    fly_processes(ProcessSpec("mission", config, {}, "test-own-sensors", log=str(tmp_path / "own.mcap")), Silent())
     logs = [lapwing.read_log(tmp_path / f"{name}.mcap") for name in ("single", "own")]
     logs.append(lapwing.read_log(flight.save(tmp_path / "saved.mcap")))
     assert {log.digest for log in logs} == {flight.digest}

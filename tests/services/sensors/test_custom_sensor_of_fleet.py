@@ -22,6 +22,7 @@ def run(folder, scene, text=PROXIMITY):
     return subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
 
 
+@pytest.mark.nightly
 @pytest.mark.long
 def test_sensor_measures_distance_to_nearest_vehicle(tmp_path):
     done = run(tmp_path, "formation")
@@ -46,10 +47,7 @@ def test_sensor_detects_no_vehicle_in_scene_of_one_vehicle(tmp_path):
 
 @pytest.mark.parametrize(
     ("mistake", "cause"),
-    [
-        ("distance.wrong", "Unknown attribute 'wrong' of type float64"),
-        ("sorted([distance], key=1)[0]", "Key must be"),
-    ],
+    [("distance.wrong", "Unknown attribute 'wrong' of type float64"), ("sorted([distance], key=1)[0]", "Key must be")],
 )
 def test_code_that_does_not_compile_is_named_in_one_line(tmp_path, mistake, cause):
     done = run(tmp_path, "formation", PROXIMITY.replace("return min(distance, ", f"return min({mistake}, "))

@@ -15,13 +15,13 @@ from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.noise import stream_key
 from lapwing.dynamics.terrain import LEVEL, relief
 from lapwing.dynamics.vector import ZERO
+from lapwing.flights.flight_data import FlightData
 from lapwing.services.common.ports import GPS_FLOAT, GPS_RTK, GPS_SINGLE, GpsReading
 from lapwing.services.sensors import encoders, gps, multipath, registry, satellites
 from lapwing.services.sensors.multipath import CHIP, WAVELENGTH, Reflections
 from lapwing.services.sensors.rtk import Gap, Rtk
 from lapwing.services.sensors.satellites import Constellation
 from lapwing.services.sensors.sensor_inputs import Truth
-from lapwing.studies.flight_data import FlightData
 
 pytestmark = pytest.mark.usefixtures("uncompiled")
 

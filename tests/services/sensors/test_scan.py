@@ -9,8 +9,8 @@ import pytest
 
 from lapwing.dynamics.terrain import LEVEL, ray, relief
 from lapwing.dynamics.terrain.ray_casting import as_relief, cast, steepness
+from lapwing.flights.flight_data import FlightData
 from lapwing.services.sensors import depth_camera, lidar, scan
-from lapwing.studies.flight_data import FlightData
 
 pytestmark = pytest.mark.usefixtures("uncompiled")
 

@@ -12,11 +12,11 @@ from scipy.spatial.transform import Rotation
 
 from lapwing.cosim.config.serialise import first_difference, from_json, to_json
 from lapwing.dynamics.vehicles.visible_body import visible_body
+from lapwing.flights.flight_data import FlightData
 from lapwing.messages.topics import LASER_SCAN
-from lapwing.services.common.vehicle_schema import airframe
+from lapwing.services.common.schemas.vehicle_schema import airframe
 from lapwing.services.mavlink.telemetry.obstacle_distance import obstacle_distance
 from lapwing.services.scene_resolver import load, parse, reseed, resolve
-from lapwing.studies.flight_data import FlightData
 
 SCENE = """
 [run]
@@ -96,11 +96,11 @@ def poses(log, vehicle, times):
 
 
 def test_only_ranging_sensors_read_other_vehicles(scene_file):
-    setup = resolve(load(scene_file))
-    inputs = [i.port for i in setup.services["sensors"].inputs]
+    config = resolve(load(scene_file))
+    inputs = [i.port for i in config.services["sensors"].inputs]
     assert inputs == ["seeing/truth", "seen/truth", "ahead/truth"]
-    assert first_difference(from_json(to_json(setup)), setup) is None
-    assert first_difference(reseed(setup, 9), resolve(load(scene_file, ["run.seed=9"]))) is None
+    assert first_difference(from_json(to_json(config)), config) is None
+    assert first_difference(reseed(config, 9), resolve(load(scene_file, ["run.seed=9"]))) is None
     blind = resolve(load("fleet")).services["sensors"]
     assert [i.port for i in blind.inputs] == ["scout/truth"]
 

@@ -7,9 +7,9 @@ import pytest
 
 from lapwing.cosim.diagram.multi_vehicle import member
 from lapwing.cosim.scene import SceneError
+from lapwing.flights.mission import mission_of
 from lapwing.services.scene_resolver import parse, resolve
 from lapwing.services.trajectory.leader_follower import step
-from lapwing.studies.mission import mission_of
 from tests.cosim.memory_log import fly
 
 SCENE = """
@@ -133,14 +133,14 @@ def test_phases_equal_to_leaders_are_rejected(tmp_path):
 @pytest.mark.parametrize(("duration", "cut_short"), [(2.0, True), (7.5, True), (9.0, False)])
 def test_short_run_of_follower_completes(tmp_path, duration, cut_short):
     """The leader ends its trajectory at 8 s, the follower its displacement at 5 s."""
-    setup = resolve(parse(tmp_path / "two.toml", SCENE, [f"run.duration={duration}"]))
+    config = resolve(parse(tmp_path / "two.toml", SCENE, [f"run.duration={duration}"]))
     for name in ("leader", "wing"):
-        mission = mission_of(member(setup, name), np.zeros(3))
+        mission = mission_of(member(config, name), np.zeros(3))
         assert mission.is_longer is cut_short
 
 
 def test_follower_that_ends_in_air_completes(tmp_path):
-    setup = resolve(parse(tmp_path / "two.toml", SCENE.replace("to = 0.0", "to = 2.0"), ["run.duration=20.0"]))
-    assert mission_of(member(setup, "wing"), np.zeros(3)).final_phase == "closer"
-    setup = resolve(parse(tmp_path / "two.toml", SCENE, ["run.duration=20.0"]))
-    assert mission_of(member(setup, "wing"), np.zeros(3)).final_phase is None
+    config = resolve(parse(tmp_path / "two.toml", SCENE.replace("to = 0.0", "to = 2.0"), ["run.duration=20.0"]))
+    assert mission_of(member(config, "wing"), np.zeros(3)).final_phase == "closer"
+    config = resolve(parse(tmp_path / "two.toml", SCENE, ["run.duration=20.0"]))
+    assert mission_of(member(config, "wing"), np.zeros(3)).final_phase is None

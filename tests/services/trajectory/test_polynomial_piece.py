@@ -49,7 +49,7 @@ def test_joint_belongs_to_later_piece():
 
 def test_reference_is_offset_by_origin():
     ramp, still = channel(Piece(9.0, (0.0, 1.0))), channel(Piece(0.0, (0.0,)))
-    p = Parameters(ramp, still, still, ramp, np.array([0.0, 2.0]), np.zeros(2), (1.0, 2.0, 3.0), 0.5)
+    p = Parameters(ramp, still, still, ramp, np.array([0.0, 2.0]), np.zeros(2), np.zeros(2), (1.0, 2.0, 3.0), 0.5)
     r = evaluate(p, 4.0, 0)
     assert r.position_world == (5.0, 2.0, 3.0)
     assert r.velocity_world == (1.0, 0.0, 0.0)

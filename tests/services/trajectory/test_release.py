@@ -23,7 +23,7 @@ def test_payload_is_released_only_on_ground():
         {"name": "descend again", "z": height(0.0)},
     ]
     flight = fly(load("hover", {"effects.payload_release": {}, "trajectory.phase": phases, "run.duration": 18.0}))
-    t, thrust = flight.setup.interval * np.arange(len(flight.truth)), flight.truth.rotor_thrust.sum(axis=1)
+    t, thrust = flight.config.interval * np.arange(len(flight.truth)), flight.truth.rotor_thrust.sum(axis=1)
     first, second = ((t > begin) & (t < begin + 1.0) for begin in (4.5, 15.5))
     weight = [mass * 9.80665 for mass in (10.0224, 8.0224)]
     assert [thrust[first].mean(), thrust[second].mean()] == pytest.approx(weight, rel=0.01)

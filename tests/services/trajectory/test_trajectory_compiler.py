@@ -160,3 +160,38 @@ def test_final_phase_follows_last_flight():
     assert compile({"phase": [up, down]}).final == 1
     assert compile({"phase": [up, down, *again]}).final == 3
     assert compile({"phase": [up]}).final == 1  # never lands: no phase is the last one on the ground
+
+
+@pytest.mark.parametrize(("height", "lands"), [(1.0, True), (0.6, True), (1.04, True), (1.2, False)])
+def test_trajectory_that_ends_on_an_obstacle_goes_on_downwards(height, lands):
+    hold = {"name": "land", "duration": 2.0}
+    phases = [
+        {"name": "up", "z": {"kind": "ramp", "to": 3.0, "rate": 1.0}},
+        {"name": "over", "x": {"kind": "ramp", "to": 5.0, "rate": 1.0}},
+        {"name": "down", "z": {"kind": "ramp", "to": height, "rate": 1.0}},
+        hold,
+    ]
+    roof = Phases.model_validate({"phase": phases})
+    result = trajectory_compiler.compile(roof, ground=lambda x, y: 1.0 if x > 4.0 else 0.0)
+    stop = 3.0 + 5.0 + 3.0 - height
+    later = evaluate(result.parameters, stop + 0.5, result.final)
+    assert (result.final, later.final) == ((2, True) if lands else (4, False))
+    assert later.position_world[2] == pytest.approx(height - 0.5 * 0.3 * lands)
+    assert later.velocity_world[2] == pytest.approx(-0.3 * lands)
+    assert (later.landing_speed > 0.0) is lands
+    assert evaluate(result.parameters, stop - 0.5, result.final).position_world[2] == pytest.approx(height + 0.5)
+
+
+def test_landing_speed_is_that_of_the_end_on_the_ground():
+    up, slow = {"kind": "ramp", "to": 2.0, "rate": 1.0}, {"kind": "minimum_jerk", "to": 0.0, "duration": 3.0}
+    phases = [
+        {"name": "up", "z": up},
+        {"name": "down", "z": {"kind": "ramp", "to": 0.0, "rate": 0.8}},
+        {"name": "rest", "duration": 1.0},
+        {"name": "up again", "z": up},
+        {"name": "softly", "z": slow},
+        {"name": "touch and go", "z": [up, {"kind": "ramp", "to": 0.0, "rate": 0.5}]},
+        {"name": "dive", "z": {"kind": "ramp", "to": -12.0, "rate": 8.0}},
+    ]
+    speeds = trajectory_compiler.compile(Phases.model_validate({"phase": phases})).parameters.phase_landing_speed
+    assert speeds == pytest.approx([-1.0, 0.8, 0.0, -1.0, 0.0, 0.5, -1.0])

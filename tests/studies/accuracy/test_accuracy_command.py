@@ -1,17 +1,20 @@
-"""Accuracy study of a scalar problem with known errors and times, and its command."""
+"""Accuracy study of scalar problems with known errors and work, and its command."""
 
+import itertools
 import json
+import time
 
 import numpy as np
 import pytest
 
-from lapwing.studies.accuracy import accuracy_command, console_output
 from lapwing.studies.accuracy.error_budget import SOURCES
 from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
 from lapwing.studies.accuracy.targets import find, scene_of
 from lapwing.studies.accuracy.work_precision import Point, cheapest, check_target, measure, pareto_points
-from lapwing.studies.accuracy.work_precision_plot import draw
-from lapwing.studies.terminal import console
+from lapwing.views.studies import accuracy_command
+from lapwing.views.studies import accuracy_command as console_output
+from lapwing.views.studies.accuracy_plot import draw
+from lapwing.views.terminal import console
 
 
 def decay():
@@ -67,6 +70,41 @@ def test_cheapest_that_meets_target_is_named():
     assert [p.setting for p in pareto_points(points(), [1e-2, 1e-4])] == [0.1, 0.05, 1e-3, 1e-6]
 
 
+def oscillator(seconds=0.0):
+    """Return a problem with two methods of known error, whose runs sleep for `seconds`."""
+
+    def solver_method(name, order, stages):
+        def read(h, result):
+            end = np.array([1.0 + h**order])
+            return SolverRun(np.array([0.0, 1.0]), np.array([[1.0], end]), 0.0, stages * round(1.0 / h))
+
+        steps = [0.25 / 2**k for k in range(12)]
+        return SolverMethod(name, order, "s", steps, lambda h: lambda: time.sleep(seconds), read, lambda: None)
+
+    methods = [solver_method("second", 2, 2), solver_method("fourth", 4, 4)]
+    return Problem("powers", 1.0, methods, lambda: np.array([1.0]), "closed form")
+
+
+def test_points_and_choice_do_not_depend_on_the_clock(monkeypatch):
+    """A run of more than 0.1 s ended the refinement, and the fastest point by stopwatch was chosen."""
+    expected = measure(oscillator(), timed=False)
+    generator, count = np.random.default_rng(1), itertools.count()
+    stopped, backwards, slow = lambda: 7.0, lambda: -1e3 * next(count), lambda: 1e4 * next(count)
+    for reading in (stopped, backwards, slow, lambda: float(generator.uniform(-1e6, 1e6))):
+        for clock in ("perf_counter", "monotonic", "process_time", "thread_time", "time"):
+            monkeypatch.setattr(time, clock, reading)
+        points = measure(oscillator())
+        assert [p[:5] + p[6:8] for p in points] == [p[:5] + p[6:8] for p in expected]
+        assert [cheapest(points, goal)[:4] for goal in (1e-1, 1e-3, 1e-6)] == [
+            ("second", 2, "s", 0.25), ("fourth", 4, "s", 0.125), ("fourth", 4, "s", 2.0**-5),
+        ]  # fmt: skip
+
+
+def test_budget_of_a_run_is_evaluations():
+    points = measure(oscillator(), most=100, timed=False)
+    assert [p.evaluations for p in points] == [8, 16, 32, 64, 128, 16, 32, 64, 128]
+
+
 @pytest.mark.parametrize("goal", [0.0, -1e-3, float("nan"), float("inf")])
 def test_invalid_error_goal_is_rejected(goal):
     with pytest.raises(ValueError, match=r"--target .*: expected an error above 0"):
@@ -87,15 +125,19 @@ def test_problem_name_precedes_scene_name():
 
 
 def test_json_and_picture(tmp_path):
-    study = accuracy_command.Study("decay", decay(), points(), points()[1], [], None, None)
+    study = accuracy_command.Study("decay", decay(), points(), 1e-4, points()[1], [], None, None)
     accuracy_command.write_json(tmp_path / "a.json", study)
     data = json.loads((tmp_path / "a.json").read_text())
     assert data["cheapest"]["method"] == "one"
     assert data["points"][2] == {
         "method": "two", "order": 5, "unit": "tol", "setting": 1e-6, "error": 5e-7, "time": 3e-5, "evaluations": 90,
-        "drift": {"manifold": 0.0},
+        "drift": {"manifold": 0.0}, "spread": [None, None],
     }  # fmt: skip
-    draw(tmp_path / "a.png", "decay", points())
+    assert accuracy_command.answer(study) == (
+        "0.0001: one at 50 ms (error 6.0e-05), 0.02 ms of CPU time for 1 s, 80 evaluations; "
+        "ten times more accurate costs 1.1 times"
+    )
+    draw(tmp_path / "a.png", "decay", points(), goal=1e-4, selected=points()[1])
     assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
 
 
@@ -109,7 +151,7 @@ def test_command_prints_cheapest_method(capsys, tmp_path, monkeypatch):
     accuracy_command.write_json(tmp_path / "a.json", result)
     printed = capsys.readouterr().out
     assert "OS4 quadrotor: experiment 1" in printed
-    assert "cheapest: " in printed
+    assert any(line.startswith("0.001: ") for line in printed.splitlines()[:2])  # behind progress, if it took a while
     result = json.loads((tmp_path / "a.json").read_text())
     assert result["cheapest"]["error"] <= 1e-3
     assert {"rkmk54", "lie_euler", "erk4m"} == {p["method"] for p in result["points"]}
@@ -135,9 +177,9 @@ def test_scene_with_contact_has_error_sources_and_cost(capsys, monkeypatch):
 def test_table_fits_80_columns(capsys):
     drift = dict.fromkeys(("manifold", "energy", "vertical momentum"), 1.23e-123)
     wide = Point("implicit_lie_midpoint", 2, "s", 5.7220458984375e-05, 3.2e-13, 0.15, 12_345_678, drift)
-    console_output.show(console(80), decay(), [wide], wide)
+    console_output.show_points(console(80), decay(), [wide])
     output = capsys.readouterr().out
     assert max(map(len, output.splitlines())) <= 80
     assert "…" not in output
-    assert "5.72e-05 s" in output
+    assert "0.0572 ms" in output
     assert "12345678" in output

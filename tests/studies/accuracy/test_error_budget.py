@@ -36,7 +36,7 @@ def test_difference_at_common_ticks():
 def test_flight_in_memory_moves_plant():
     flights = fly(load(ROOT / "lapwing/scenes/os4_experiment_2.toml", ["run.duration=0.4", "solver.integrator=rkmk4"]))
     assert len(flights.truth) == 101
-    assert flights.setup.interval == 0.004
+    assert flights.config.interval == 0.004
     t = 0.4
     assert flights.truth.position[-1, 1] > 0.0  # experiment 2 moves to +y
     assert abs(flights.truth.position[-1, 2]) < 1e-3 * 9.81 * t * t

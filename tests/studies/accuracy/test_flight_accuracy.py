@@ -15,8 +15,9 @@ from lapwing.dynamics.integrators import LEAST_TOLERANCE
 from lapwing.services.plant.schema import LEAST_ACCURACIES, Solver, contact_tolerance
 from lapwing.services.scene_resolver import load
 from lapwing.studies.accuracy.flight_accuracy import ClosedLoop, FlightAccuracy
-from lapwing.studies.accuracy.flight_accuracy_output import show
 from lapwing.studies.accuracy.state_errors import Quantity, differences
+from lapwing.views.studies.flight_accuracy_console import show
+from tests.combinations import rest_nightly
 
 ROOT = Path(__file__).parents[3]
 
@@ -49,7 +50,7 @@ def test_command_compares_error_with_accuracy(tmp_path, accuracy, code, verdict)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("accuracy", ["1e-4", "1e-8"])
+@pytest.mark.parametrize("accuracy", rest_nightly("1e-4", "1e-8"))
 def test_unloading_crate_meets_accuracy(tmp_path, accuracy):
     """The pack bounces on rollers, door and ground; a tenth of the accuracy per substep gave an error of 2.2e-3."""
     result = check(tmp_path, "--accuracy", "--set", f"solver.accuracy={accuracy}", scene="unload")
@@ -65,7 +66,7 @@ NO_RESOLUTION = tuple(
 
 
 @pytest.mark.long
-@pytest.mark.parametrize(("accuracy", "code", "verdict"), [(1e-4, 0, "met"), (1e-9, 1, "missed")])
+@pytest.mark.parametrize(("accuracy", "code", "verdict"), rest_nightly((1e-4, 0, "met"), (1e-9, 1, "missed")))
 def test_solver_error_excludes_sensor_resolution(tmp_path, accuracy, code, verdict):
     """The resolution of the gyroscope is 2.7e-4 rad/s at any step; only the error of the solver decides."""
     options = (*CLOSED_LOOP, "--set", f"solver.accuracy={accuracy}", "--json", "a.json")
@@ -97,6 +98,17 @@ def test_missed_selection_names_step_of_fourth_order(capsys, error, step):
     show(Console(), FlightAccuracy(1e-4, "rk4_renormalised", 0.004, 0.0005, True, 2.0, [quantity]))
     assert f"--set solver.integrator=rk4_renormalised --set solver.step={step}\n" in capsys.readouterr().out
     load("hover", [f"solver.step={step}"])
+
+
+def test_error_of_held_quantities_is_shown_apart_and_decides(capsys):
+    quantities, held = [Quantity("a", "velocity", 1e-9, 1.0)], [Quantity("a", "position", 3e-5, 2.0)]
+    result = FlightAccuracy(1e-6, "rk4_renormalised", 0.004, 0.0005, True, 2.0, quantities, 2.0, None, 250.0, held)
+    assert not result.met
+    show(Console(), result)
+    lines = capsys.readouterr().out.splitlines()
+    assert any(line.startswith("accuracy of the solver met: error 1.0e-09") for line in lines)
+    assert "held quantities, updated at 250 Hz: missed, error 3.0e-05 (position, 2.000 s)" in lines
+    assert lines[-1].startswith("communication.rate: 250 Hz holds quantities with an error of 3.0e-05")
 
 
 @pytest.mark.parametrize("vehicles", [["a"], ["drone1", "drone2"]])

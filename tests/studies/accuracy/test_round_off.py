@@ -132,3 +132,20 @@ def test_round_off_of_scene_is_above_that_of_one_step_and_small(name: str) -> No
     assert result is not None
     assert result.steps >= round_off.STEPS
     assert 2.0**-54 < result.error < 1e-10
+
+
+def test_function_is_not_taken_for_a_freed_one() -> None:
+    """Extended functions were found by the address of the original, which the next generated function can have."""
+
+    def function(n):
+        names = {"__name__": "lapwing.generated"}
+        exec(f"def evaluate(): return {n}", names)
+        return names.pop("evaluate")
+
+    known: dict = {}
+    freed = [function(n) for n in range(100)]
+    for each in freed:
+        round_off._extend(each, known)
+    del freed, each
+    others = [function(n) for n in range(100, 200)]  # at the same addresses
+    assert [round_off._extend(other, known)() for other in others] == list(range(100, 200))

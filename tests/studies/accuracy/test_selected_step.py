@@ -7,6 +7,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.combinations import rest_nightly
+
 SCENES = Path(__file__).parents[3] / "lapwing/scenes"
 
 
@@ -23,13 +25,13 @@ def check(scene, accuracy, folder, *more):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("scene", ["excitation", "hexacopter"])
+@pytest.mark.parametrize("scene", rest_nightly("excitation", "hexacopter"))
 def test_selected_step_meets_accuracy_when_motors_saturate(scene, tmp_path):
     check(scene, 1e-4, tmp_path)
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("accuracy", [1e-4, 1e-6])
+@pytest.mark.parametrize("accuracy", rest_nightly(1e-4, 1e-6))
 def test_selected_step_meets_accuracy_between_limits_of_dc_motor(accuracy, tmp_path):
     """4 ms was selected for 1e-4, with an error of 1.0e-3 after 28 s, and no step for 1e-6."""
     text = (SCENES / "delivery_mission.toml").read_text(encoding="utf-8")

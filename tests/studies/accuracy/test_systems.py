@@ -8,11 +8,15 @@ from lapwing.studies.accuracy.coordinates import error, matrices, of_state
 from lapwing.studies.accuracy.reference import attitude_rate
 from lapwing.studies.accuracy.systems import free_rigid_body, problems
 from lapwing.studies.accuracy.work_precision import drift
+from tests.combinations import rest_nightly
 
 pytestmark = pytest.mark.long
 
 
-@pytest.mark.parametrize("name", [n for n, p in problems().items() if any(m.name == "rkmk54" for m in p.methods)])
+SYSTEMS = [name for name, p in problems().items() if any(m.name == "rkmk54" for m in p.methods)]
+
+
+@pytest.mark.parametrize("name", rest_nightly(*SYSTEMS, keep=3))
 def test_integrator_agrees_with_reference(name):
     problem = problems()[name]
     method = next(m for m in problem.methods if m.name == "rkmk54")

@@ -3,6 +3,7 @@
 import errno
 import json
 import os
+import shlex
 import subprocess
 import sys
 from pathlib import Path
@@ -15,12 +16,12 @@ from lapwing.cli.main import app
 from lapwing.studies import workers
 from lapwing.studies.campaign import folder as folder_module
 from lapwing.studies.campaign import run_table
-from lapwing.studies.campaign.campaign_comparison import compare
+from lapwing.studies.campaign.comparison import compare
 from lapwing.studies.campaign.distributions import choice, normal, uniform
 from lapwing.studies.campaign.folder import begin, manifest, read
 from lapwing.studies.campaign.plan import plan
 from lapwing.studies.campaign.results import Results
-from lapwing.studies.campaign.runs import first_setup, fly_runs, reference, row_of
+from lapwing.studies.campaign.runs import first_config, fly_runs, reference, row_of
 from lapwing.studies.campaign.shard_loop import Count, StoppingRule, campaign
 from lapwing.studies.campaign.statistics import interval
 
@@ -34,7 +35,7 @@ RUNS = 40
 
 def begin_campaign(path, **changes):
     new_plan = plan(**{"path": SCENE, "overrides": SHORT, "runs": RUNS, "vary": VARY, **changes})
-    first = reference(*first_setup(new_plan))
+    first = reference(*first_config(new_plan))
     return begin(path, new_plan, manifest(new_plan, first)), first
 
 
@@ -276,6 +277,27 @@ def test_report_json_and_repeated_run(complete, tmp_path, monkeypatch):
     assert (code, "differs from the campaign" in output) == (2, True)
 
 
+def test_failed_run_shrinks_to_least_change(complete, tmp_path, monkeypatch):
+    folder, _ = complete
+    failed = Results(folder).worst(1)[0]
+    code, output = run_lapwing("campaign", folder.path, "--explain", failed["run"], "--json", tmp_path / "e.json")
+    assert code == 0
+    explanation = json.loads((tmp_path / "e.json").read_text())
+    assert explanation["criteria"] == ["max_tilt < 0.03"]
+    assert explanation["unneeded"] == ["vehicle.mass"]  # the tilt against the wind decides
+    (change,) = explanation["changes"]
+    assert change["passes"] < change["least"] < change["drawn"] == failed["effects.random_wind_force.mean.0"]
+    command = output.strip().splitlines()[-1]
+    assert command == explanation["command"]
+    monkeypatch.chdir(tmp_path)
+    assert run_lapwing(*shlex.split(command)[1:], "--mode", "single-process", "--log", "least.mcap")[0] == 4
+    passing = command.replace(f"mean.0={change['least']}", f"mean.0={change['passes']}")
+    assert run_lapwing(*shlex.split(passing)[1:], "--mode", "single-process", "--log", "passing.mcap")[0] == 0
+    success = int(Results(folder)["run"][Results(folder)["success"].astype(bool)][0])
+    code, output = run_lapwing("campaign", folder.path, "--explain", success)
+    assert (code, f"--explain {success}: the run succeeds; expected a failed run" in output) == (2, True)
+
+
 def test_comparison_pairs_runs(complete, tmp_path):
     folder, _ = complete
     other, first = begin_campaign(tmp_path / "heavier", overrides=(*SHORT, "autopilot.gains=paper"))
@@ -283,6 +305,9 @@ def test_comparison_pairs_runs(complete, tmp_path):
     code, output = run_lapwing("compare", folder.path, other.path, "--json", tmp_path / "d.json")
     assert (code, f"{RUNS} pairs of runs" in output) == (0, True)
     assert "differences: overrides\n" in output
+    first, *_ = output.splitlines()
+    assert "tracking error " in first
+    assert "first difference: actuators: " in first  # other gains, and nothing else
     assert "…" not in output  # no number is cut at 80 columns
     (row,) = [line.split() for line in output.splitlines() if line.split()[:1] == ["energy"]]
     assert row[:4] == ["energy", "[W", "h]", "*"]
@@ -311,10 +336,7 @@ def test_comparison_pairs_runs(complete, tmp_path):
         (["hover", "--vary", "effects.gravity.0=uniform(0,1)"], "lapwing: --vary effects.gravity.0: "),
         (["hover", "--vary", "run.title.a=uniform(0,1)"], "lapwing: --vary run.title.a"),
         (["hover", "--vary", "=uniform(0,1)"], "--vary =uniform(0,1): expected KEY=DISTRIBUTION"),
-        (
-            ["hover", "--vary", "run.seed=choice(1,2)"],
-            "--vary run.seed: each run has its own seed; use --seed",
-        ),
+        (["hover", "--vary", "run.seed=choice(1,2)"], "--vary run.seed: each run has its own seed; use --seed"),
         (["hover", "--set", "run.seed=4"], "override run.seed: each run has its own seed; use --seed"),
         (
             ["hover", "--vary", "vehicle.mass=normal(10,1)", "--vary", "vehicle.mass=uniform(9,10)"],
@@ -324,10 +346,7 @@ def test_comparison_pairs_runs(complete, tmp_path):
         (["gyrostat_blocked"], "expected a scene whose autopilot follows a [trajectory]"),
         (["hover", "--report", "c.gif"], "--report c.gif: expected a name that ends in .html, .pdf or .png"),
         (["hover", "--ci-half-width", "2"], "--ci-half-width 2: expected a probability between 0 and 1"),
-        (
-            ["hover", "--ci-half-width", "0.1", "--shard", "1/2"],
-            "--ci-half-width: needs the results of all runs",
-        ),
+        (["hover", "--ci-half-width", "0.1", "--shard", "1/2"], "--ci-half-width: needs the results of all runs"),
         (["hover", "--workers", "2", "--cluster", "tcp://127.0.0.1:1"], "--workers: a cluster has its own"),
         (["hover", "--workers", "0"], "--workers 0: expected at least 1"),
         (["hover", "--runs", "4", "--out", "{}", "--shard", "3/500"], "has 4 shards; expected at most I/4"),

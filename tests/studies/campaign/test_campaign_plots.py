@@ -7,16 +7,18 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 
-from lapwing.studies.campaign import campaign_plots
-from lapwing.studies.campaign.campaign_plots import errors, parallel, sensitivity
+from lapwing.flights.metrics import METRICS
 from lapwing.studies.campaign.distributions import uniform
 from lapwing.studies.campaign.plan import plan
 from lapwing.studies.campaign.results import Results
-from lapwing.studies.campaign.statistics import Interval, has_sobol
-from lapwing.studies.campaign.varied_parameters import MAX_KEYS
-from lapwing.studies.metrics import METRICS
-from lapwing.studies.report import matplotlib_figure
-from lapwing.studies.report.style import QUIET
+from lapwing.studies.campaign.verdict import verdict
+from lapwing.views.report import matplotlib_figure
+from lapwing.views.report.style import QUIET
+from lapwing.views.studies import campaign_plots
+from lapwing.views.studies.campaign_plots import MAX_KEYS, criteria_plot, errors, sensitivity
+from lapwing.views.studies.campaign_result import result as campaign_result
+from lapwing.views.studies.study_result import show
+from lapwing.views.terminal import console
 
 KEYS = ("a", "b")
 MANY = tuple("abcdefghijkl")
@@ -60,18 +62,17 @@ def test_correlations_within_chance_are_grey():
     assert colours["a"] == QUIET != colours["b"]
 
 
-@pytest.mark.skipif(not has_sobol(), reason="SALib is not installed: pip install lapwing[campaign]")
-def test_constant_parameter_has_no_index():
+def test_constant_parameter_has_no_share():
     def speed(drawn):
         drawn["b"][:] = np.where(drawn["b"] < 0.5, 0.25, drawn["b"])
         return np.where(drawn["b"] == 0.25, drawn["a"], np.nan)
 
-    result = bars(sensitivity(table(400, **{"touchdown.speed": speed})), "first-order", "touchdown.speed")
+    result = bars(sensitivity(table(400, **{"touchdown.speed": speed})), "share", "touchdown.speed")
     assert set(result) == {"a"}
     assert result["a"] == pytest.approx(1.0, abs=0.1)
 
 
-def test_sobol_indices_are_omitted_for_correlated_parameters(tmp_path):
+def test_shares_are_omitted_for_correlated_parameters(tmp_path):
     lines = [f"{k / 100},{k / 50}" for k in range(100)]
     (tmp_path / "s.csv").write_text("\n".join(["a,b", *lines]))
     plot = sensitivity(table(100, tmp_path / "s.csv", energy=lambda drawn: drawn["a"]))
@@ -79,33 +80,47 @@ def test_sobol_indices_are_omitted_for_correlated_parameters(tmp_path):
     assert "unlike those of a sweep" in plot.caption
 
 
-def test_omitted_grid_runs_do_not_remove_values():
-    results = table(3000, energy=lambda drawn: drawn["b"])
-    results.columns["b"][:] = np.arange(3000) % 10  # every tenth run has the same value
-    (line,) = parallel(results).panels[0].marks
-    lines = line.y.reshape(-1, 4)[:, :3]
-    assert lines.shape == (300, 3)
-    assert len(np.unique(lines[:, 1])) == 10
+def failing_table(runs=200):
+    """Return a campaign whose runs with a >= 0.25 miss a limit of the touchdown speed, which is a."""
+    result = table(runs, **{"touchdown.speed": lambda drawn: drawn["a"], "rmse.z": lambda drawn: 0.01 * drawn["b"]})
+    is_failed = result["touchdown.speed"] >= 0.25
+    result.folder.about |= {"success": ["rmse.z < 0.1", "touchdown.speed < 0.25"], "vary": {}, "versions": {}}
+    result.folder.path = "folder"
+    result.columns["success"] = ~is_failed
+    result.columns["outcome_text"] = np.where(is_failed, "Landed; not touchdown.speed < 0.25", "").astype(object)
+    return result, int(is_failed.sum())
 
 
-def test_sobol_indices_use_limited_number_of_runs(monkeypatch):
-    requested = []
-    monkeypatch.setattr(campaign_plots, "has_sobol", lambda: True)
-    monkeypatch.setattr(
-        campaign_plots, "sobol", lambda x, y, names: requested.append(x) or [Interval(0.5, 0.4, 0.6)] * len(names)
+def test_verdict_names_failures_criteria_and_driver():
+    result, failures = failing_table()
+    text = verdict(result)
+    assert text.startswith(f"{failures} of 200 runs fail, {round(failures / 2)} % (95 %: ")  # digits that n allows
+    assert f": {failures} by touchdown.speed < 0.25, 0 by rmse.z < 0.1; " in text
+    assert text.endswith("; touchdown.speed is driven by a (1.0 of the variance)")
+    first, *_ = campaign_result(result).plots
+    assert first == "Criteria"
+
+
+def test_first_figure_has_failing_metric_with_limit():
+    result, failures = failing_table()
+    bars, distribution = criteria_plot(result).panels
+    assert {bar.lane: bar.end for bar in bars.marks} == pytest.approx(
+        {"touchdown.speed < 0.25": failures / 2, "rmse.z < 0.1": 0.0, "any": failures / 2}
     )
-    monkeypatch.setattr(campaign_plots, "SOBOL_MAX_RUNS", 100)
-    results = table(2000, energy=lambda drawn: drawn["b"])
-    results.columns["b"][:] = np.arange(2000) % 10
-    sensitivity(results)
-    assert requested[0].shape == (100, 2)
-    assert len(np.unique(requested[0][:, 1])) == 10
+    assert distribution.x_label == "touchdown.speed [m/s]"
+    assert distribution.marks[-1].x.tolist() == [0.25, 0.25]
 
 
-def test_long_keys_are_broken_into_lines():
-    assert campaign_plots._break_key("effects.random_wind_force.mean.0") == "effects.\nrandom_wind_force.\nmean.0"
-    assert campaign_plots._break_key("vehicle.mass") == "vehicle.mass"
-    assert campaign_plots._break_key("touchdown.speed [m/s]") == "touchdown.\nspeed [m/s]"
+def test_console_begins_with_verdict_and_fits_80_columns():
+    result, failures = failing_table()
+    screen = console(80)
+    with screen.capture() as capture:
+        show(screen, campaign_result(result))
+    lines = capture.get().splitlines()
+    assert lines[0].startswith(f"hover: 200 runs: {failures} of 200 runs fail")
+    assert any(line.strip().startswith("touchdown.speed < 0.25") and "█" in line for line in lines)
+    tables = [line for line in lines[1:] if not line.startswith("  ")]
+    assert max(map(len, tables)) <= 80
 
 
 def test_errors_are_shares_of_requirements():
@@ -120,16 +135,12 @@ def test_errors_are_shares_of_requirements():
 def test_weak_parameters_are_listed_instead_of_plotted():
     result = table(200, keys=MANY, energy=lambda drawn: drawn["l"] + 0.5 * drawn["k"])
     assert len(bars(sensitivity(result), "rank", "energy")) == len(MANY)
-    for draw in (campaign_plots.success, parallel):
-        plot = draw(result)
-        reported = (
-            plot.caption.partition("Omitted, because their correlations are weakest: ")[2].rstrip(".").split(", ")
-        )
-        assert len(reported) == len(MANY) - MAX_KEYS
-        assert not {"k", "l"} & set(reported)
-    assert [panel.x_label for panel in campaign_plots.success(result).panels] == [
-        key for key in MANY if key not in reported
-    ]
+    result.columns["success"] = result["energy"] < 0.7
+    plot = campaign_plots.success(result)
+    reported = plot.caption.partition("Omitted, because their influence is weakest: ")[2].rstrip(".").split(", ")
+    assert len(reported) == len(MANY) - MAX_KEYS
+    assert [panel.x_label for panel in plot.panels][:2] == ["l", "k"]
+    assert {panel.x_label for panel in plot.panels} == set(MANY) - set(reported)
 
 
 def test_printed_axis_labels_do_not_overlap():

@@ -13,7 +13,7 @@ from lapwing.studies import workers
 from lapwing.studies.campaign.cluster import dask
 from lapwing.studies.campaign.folder import begin, manifest
 from lapwing.studies.campaign.plan import plan
-from lapwing.studies.campaign.runs import first_setup, reference
+from lapwing.studies.campaign.runs import first_config, reference
 from lapwing.studies.campaign.shard_loop import campaign
 
 pytestmark = pytest.mark.long
@@ -23,7 +23,7 @@ distributed = pytest.importorskip("distributed", reason="Dask is not installed: 
 
 def test_killed_and_late_workers_do_not_change_results(tmp_path):
     new_plan = plan("delivery_mission", ("run.duration=3.5",), runs=40, seed=7)
-    first = reference(*first_setup(new_plan))
+    first = reference(*first_config(new_plan))
     local, folder = (begin(tmp_path / name, new_plan, manifest(new_plan, first)) for name in ("alone", "cluster"))
     campaign(local, first, workers.run_here)
     with (
@@ -53,7 +53,7 @@ def test_lost_scheduler_is_one_line_and_keeps_runs(tmp_path, capfd):
     scheduler = ["dask_scheduler", "--host", address, *common]
     worker = ["dask_worker", address, "--nthreads", "1", "--local-directory", str(tmp_path), *common]
     new_plan = plan("delivery_mission", ("run.duration=3.5",), runs=400, seed=7)
-    first = reference(*first_setup(new_plan))
+    first = reference(*first_config(new_plan))
     folder = begin(tmp_path / "folder", new_plan, manifest(new_plan, first))
     with (tmp_path / "output").open("w") as output:
         helpers = [

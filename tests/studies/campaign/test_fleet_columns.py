@@ -7,16 +7,16 @@ import pytest
 from typer.testing import CliRunner
 
 from lapwing.cli.main import app
+from lapwing.flights.metrics import metrics
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.campaign.campaign_config import TOPICS
-from lapwing.studies.campaign.campaign_plots import errors, touchdown
 from lapwing.studies.campaign.folder import read
 from lapwing.studies.campaign.plan import plan
 from lapwing.studies.campaign.results import Results
 from lapwing.studies.campaign.runs import row_of
-from lapwing.studies.metrics import metrics
-from lapwing.studies.report.plot import NotRecordedError
 from lapwing.studies.simulate import fly_each
+from lapwing.views.report.plot import NotRecordedError
+from lapwing.views.studies.campaign_plots import errors, touchdown
 from tests.cosim.memory_log import fly
 
 pytestmark = pytest.mark.long
@@ -46,13 +46,13 @@ def folder(tmp_path_factory):
 
 
 def test_each_flight_of_fleet_has_all_vehicles():
-    setup = resolve(load("fleet", ["run.duration=1.0"]))
-    flights, log = fly_each(setup, TOPICS), fly(setup)
+    config = resolve(load("fleet", ["run.duration=1.0"]))
+    flights, log = fly_each(config, TOPICS), fly(config)
     assert [flight.vehicle for flight in flights] == ["left", "right", "scout"]
     for flight in flights:
         assert (flight.truth.position == log.view(f"{flight.vehicle}/ground_truth").position).all()
         assert (flight.setpoint.position == log.view(f"{flight.vehicle}/setpoint").position).all()
-        assert flight.setup.vehicle == flight.vehicle
+        assert flight.config.vehicle == flight.vehicle
         assert set(flight.fleet) == {"left", "right", "scout"}
 
 

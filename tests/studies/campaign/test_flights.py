@@ -4,21 +4,21 @@ import pytest
 import synthetic_flights
 
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
-from lapwing.cosim.executors.single_process import PAGE, run_single
+from lapwing.cosim.executors.single_process import KEPT_TICKS, run_single
 from lapwing.cosim.log import LogWriter
 from lapwing.cosim.log.log_sequencer import Recording
+from lapwing.flights.flight_data import FlightData
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, reseed, resolve
-from lapwing.studies.campaign.campaign_config import TOPICS, campaign_setup
+from lapwing.studies.campaign.campaign_config import TOPICS, campaign_config
 from lapwing.studies.campaign.distributions import parse
 from lapwing.studies.campaign.plan import plan
 from lapwing.studies.campaign.runs import row_of
-from lapwing.studies.flight_data import FlightData
 from lapwing.studies.simulate import fly
+from tests.combinations import MISSION
 
 pytestmark = pytest.mark.long
 
-MISSION = ["effects.air_density={}", "effects.random_wind_force={}"]  # whose bodies are compiled for other tests
 BLOCKED_PROPELLER = 'multibody.event=[{time=1.0, propeller=2, failure="locked"}]'
 
 
@@ -34,12 +34,12 @@ BLOCKED_PROPELLER = 'multibody.event=[{time=1.0, propeller=2, failure="locked"}]
     ids=["hover", "mission", "parallel", "battery", "five bodies and an event"],
 )
 def test_campaign_equals_single_process(scene, overrides, tmp_path):
-    in_memory = fly(reseed(campaign_setup(load(scene, overrides)), 7), TOPICS)
+    in_memory = fly(reseed(campaign_config(load(scene, overrides)), 7), TOPICS)
     assert in_memory.failure == ""
-    rate = in_memory.setup.rate
-    setup = resolve(load(scene, [*overrides, "run.seed=7", f"rates.estimate={rate}"]))
+    rate = in_memory.config.rate
+    config = resolve(load(scene, [*overrides, "run.seed=7", f"rates.estimate={rate}"]))
     with LogWriter(tmp_path / "log.mcap", {}, {}) as writer:
-        run_single(BlockDiagram(setup, create_all(setup), PAGE), Recording(writer, setup))
+        run_single(BlockDiagram(config, create_all(config), KEPT_TICKS), Recording(writer, config))
     recorded = FlightData.read(tmp_path / "log.mcap")
     names = [t.name.removeprefix("{vehicle}/") for t in TOPICS]
     assert synthetic_flights.differences(in_memory, recorded, [name for name in names if recorded.has(name)]) == []

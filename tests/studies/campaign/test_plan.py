@@ -9,7 +9,7 @@ from scipy import stats
 from lapwing.cosim.scene import SceneError
 from lapwing.studies.campaign.distributions import KINDS, choice, linspace, loguniform, normal, parse, uniform
 from lapwing.studies.campaign.plan import plan
-from lapwing.studies.campaign.runs import _rejection_text, first_setup
+from lapwing.studies.campaign.runs import _rejection_text, first_config
 
 
 def draw_values(new_plan, key):
@@ -142,7 +142,7 @@ def test_grid_is_accepted_when_first_runs_are_rejected():
     vary = {"effects.random_wind_force.sigma": choice(-1, 1), "vehicle.mass": linspace(10, 11, 20)}
     new_plan = plan("delivery_mission", vary=vary, design="grid")
     assert new_plan.runs == 40
-    assert first_setup(new_plan)[0] >= 20
+    assert first_config(new_plan)[0] >= 20
 
 
 def test_rejection_text_is_independent_of_folder():

@@ -3,14 +3,16 @@
 import numpy as np
 import pytest
 
+from lapwing.studies.campaign.explanation import least_failing
 from lapwing.studies.campaign.statistics import (
     ellipse,
-    has_sobol,
     interval,
     paired_difference,
+    percent,
     rank_correlation,
-    sobol,
+    ratio_change,
     spread,
+    variance_share,
 )
 
 
@@ -43,12 +45,31 @@ def test_rank_correlation_of_monotone_and_independent_columns():
     assert np.isnan(rank_correlation(x, np.ones(500)).value)
 
 
-@pytest.mark.skipif(not has_sobol(), reason="SALib is not installed: pip install lapwing[campaign]")
-def test_sobol_indices_of_ishigamis_function():
+def test_variance_shares_of_ishigamis_function():
     x = np.random.default_rng(4).uniform(-np.pi, np.pi, (4000, 3))
     y = np.sin(x[:, 0]) + 7.0 * np.sin(x[:, 1]) ** 2 + 0.1 * x[:, 2] ** 4 * np.sin(x[:, 0])
-    result = sobol(x, y, ["a", "b", "c"])
+    result = [variance_share(column, y) for column in x.T]
     assert [s.value for s in result] == pytest.approx([0.3139, 0.4424, 0.0], abs=0.04)  # Saltelli et al. 2008
+    assert [s.low > 0.0 for s in result] == [True, True, False]
+    assert np.isnan(variance_share(np.ones(100), y[:100]).value)
+
+
+def test_ratio_change_is_relative_and_paired():
+    a = np.random.default_rng(6).uniform(0.1, 10.0, 400)
+    result = ratio_change(a, a * np.tile([1.03, 1.05], 200))
+    assert result.value == pytest.approx(0.04, abs=1e-4)
+    assert 0.038 < result.low < result.high < 0.042
+    assert percent(result, signed=True) == "+4.00 % (95 %: +3.90 to +4.09)"
+    assert percent(interval(0, 100)) == "0 % (95 %: 0 to 4)"
+    assert percent(interval(0, 100_000)) == "0.000 % (95 %: 0.000 to 0.004)"
+
+
+def test_least_failing_value_is_bracketed():
+    for limit, nominal, drawn in ((3.3, 0.0, 10.0), (-7.77, 1.0, -20.0)):
+        distance = abs(limit - nominal)
+        least, passes = least_failing(lambda x, n=nominal, d=distance: abs(x - n) > d, nominal, drawn)
+        assert abs(passes - nominal) <= distance < abs(least - nominal)
+        assert abs(least - passes) < 2.0 * abs(drawn - nominal) / 128
 
 
 def test_ellipse_contains_share_of_points():

@@ -8,10 +8,17 @@ import numpy as np
 import pytest
 from flight_recordings import INTERVAL, simulated, write_csv
 
+from lapwing import BatchSimulator, posterior
+from lapwing.cosim.scene.toml_text import dump
 from lapwing.services.scene_resolver import load_one
 from lapwing.studies.identification.output_error import Fit, OutputError
-from lapwing.studies.identification.procedure import Identification, identify, start_value, write_airframe
-from lapwing.studies.toml_text import dump
+from lapwing.studies.identification.procedure import (
+    Identification,
+    identify,
+    joint_distribution,
+    start_value,
+    write_airframe,
+)
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.start_states import NO_TRIM
 
@@ -73,11 +80,22 @@ def test_grounded_flights_are_rejected(plant, tmp_path):
 def test_parameters_of_recordings_are_not_for_the_scene(tmp_path):
     keys = ("flight.command_delay", "effects.h_force.coefficient")
     fit = Fit(keys, np.zeros(2), np.array([0.01, 1e-6]), np.ones(2), np.eye(2), 1.0, 1, ())
-    result = Identification(SCENE, fit, ("a",), (), (), np.zeros(6), np.zeros(6))
+    result = Identification(SCENE, fit, ("a",), (), (), None, None)
     write_airframe(tmp_path / "mine.toml", SCENE, result)
+    assert tomllib.loads((tmp_path / "mine.toml").read_text())["posterior"]["keys"] == [keys[1]]
     lines = (tmp_path / "mine.toml").read_text().splitlines()
     assert "#   effects.h_force.coefficient = 1e-06" in lines
     assert not any(line.startswith("#   flight.") for line in lines)
+
+
+def test_vague_positive_parameters_are_not_drawn():
+    keys = ("airframe.motor.time_constant", "effects.h_force.coefficient", "effects.body_wrench.force.0")
+    start, errors = np.array([0.05, 1e-6, 0.0]), np.array([0.04, 1e-7, 2.0])
+    correlations = np.array([[1.0, 0.9, 0.1], [0.9, 1.0, -0.3], [0.1, -0.3, 1.0]])
+    content = joint_distribution(Fit(keys, start, start, errors, correlations, 1.0, 1, ()))["posterior"]
+    assert content["keys"] == list(keys[1:])
+    assert content["distributions"] == ["lognormal", "normal"]
+    assert np.array(content["covariance"]) == pytest.approx(np.array([[1e-14, -6e-8], [-6e-8, 4.0]]))
 
 
 def test_toml_of_nested_tables_reads_back():
@@ -105,7 +123,7 @@ def test_command_writes_airframe_with_provenance(plant, tmp_path):
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert not done.stderr
-    assert "rate [rad/s]: " in done.stdout
+    assert "rate [rad/s]" in done.stdout
     assert "nan" not in done.stdout  # power, which is not measured
     true = TRUE["airframe.motor.time_constant"]
     assert tomllib.loads(out.read_text())["motor"]["time_constant"] == pytest.approx(true, rel=0.1)
@@ -114,6 +132,27 @@ def test_command_writes_airframe_with_provenance(plant, tmp_path):
     assert f"left out: copy: the same flight as {recordings[0].name}" in done.stdout
     assert "left out: grounded: never leaves the ground, the height changes by 0.00 m" in done.stdout
     assert not out.with_name("mine.toml.progress").exists()
+    content = json.loads(figures.read_text())
+    lines = done.stdout.splitlines()
+    assert any(f"estimates on 1 held-out flight: {content['verdict']['text']}" in line for line in lines)
+    assert content["posterior"]["keys"] == list(content["parameters"])
+    assert content["posterior"] == tomllib.loads(out.read_text())["posterior"]
+    short = ("--set", "run.duration=0.5", "--set", "success.require=[]", "--runs", "3", "--csv")
+    done = run("campaign", SCENE, "--vary", out, *short, "--out", tmp_path / "flown")
+    assert done.returncode == 0, done.stderr
+    table = np.genfromtxt(tmp_path / "flown" / "runs.csv", delimiter=",", names=True, deletechars="", dtype=None)
+    batch = BatchSimulator(SCENE, 3, posterior(out))
+    batch.step(np.full((3, 4), 3.0), ticks=10)
+    assert len(set(batch.state.rotor_speed[:, 0])) == 3  # the time constants differ
+    for key, mean, variances in zip(
+        content["posterior"]["keys"], content["posterior"]["mean"], content["posterior"]["covariance"], strict=True
+    ):
+        assert len(set(table[key])) == 3
+        deviation = max(variances) ** 0.5 if key.endswith("time_constant") else np.inf
+        assert np.abs(table[key] - mean).max() < 4.0 * deviation
+    twice = run("campaign", SCENE, "--vary", f"{key}=normal(1,1)", "--vary", out, *short, "--out", tmp_path / "other")
+    assert (twice.returncode, len(twice.stderr.splitlines())) == (2, 1)
+    assert f"{key} already has a distribution" in twice.stderr
 
 
 @pytest.mark.long

@@ -11,7 +11,7 @@ from flight_recordings import INTERVAL as FLIGHT_INTERVAL
 from flight_recordings import simulated, write_csv
 
 from lapwing.dynamics.geodesy import Home, enu_to_geodetic
-from lapwing.studies.flight_import.recording import Recording, Series
+from lapwing.flights.log_import.recording import Recording, Series
 from lapwing.studies.identification.sensor_fit import fit_all, fit_sensors
 from lapwing.studies.validation.plant_rows import PlantRows
 

@@ -114,5 +114,5 @@ def test_design_ignores_gains_of_other_vehicle():
 
 def test_unreachable_margins_name_loop():
     scene = load_scene("hover", {"airframe.motor.time_constant": 20.0})
-    with pytest.raises(ValueError, match=r"no gains with 45 deg and 6 dB found: \w+: .*; use lower bandwidths"):
+    with pytest.raises(ValueError, match=r"no gains with 45 deg and 6 dB found: \w+ loop: .*; use lower bandwidths"):
         design(hover(scene), known_airframe(scene), TICK, Bandwidths(), lambda _: None)

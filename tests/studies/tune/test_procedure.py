@@ -1,3 +1,4 @@
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,10 +12,11 @@ from lapwing.services.autopilot.gains import load
 from lapwing.services.autopilot.stability_check import unstable_loops
 from lapwing.services.scene_resolver import load as load_scene
 from lapwing.studies.simulate import fly
-from lapwing.studies.tune import console_output, tuning_report
 from lapwing.studies.tune.bandwidths import Bandwidths
 from lapwing.studies.tune.gain_refinement import rmse
 from lapwing.studies.tune.procedure import tune, write
+from lapwing.views.studies.study_result import show, write_report
+from lapwing.views.studies.tune_result import result as tune_result
 
 pytestmark = pytest.mark.long
 
@@ -58,17 +60,20 @@ def test_perturbed_vehicles_land(tuning):
 
 def test_page_and_tables(tuning, tmp_path):
     path = tmp_path / "tune.html"
-    tuning_report.write(path, tuning)
+    write_report(path, tune_result(tuning))
     page = page_text(path)
     assert page.count('<figure class="plot">') == 2
     assert "Open loops" in page
     assert "rise time" in page  # legend of the numbers in the panels
     assert "mass +20 %, inertia -20 %, thrust -20 %" in page
     console = Console(record=True, width=80)
-    console_output.show(console, tuning)
+    show(console, tune_result(tuning))
     text = console.export_text()
     assert "…" not in text  # no head or name is cut
-    rows = [line.split() for line in text.splitlines() if "x_plant_input" in line]
+    assert "_plant_input" not in text
+    assert "_plant_input" not in page
+    loop = "pitch with forward loop"
+    rows = [[loop, *line.partition(loop)[2].split()] for line in text.splitlines() if loop in line]
     assert [row[1] for row in rows] == [tuning.before.name, "new"]
     for row, review in zip(rows, (tuning.before, tuning.after), strict=True):
         m = review.margins["x_plant_input"]
@@ -94,7 +99,9 @@ def test_failing_gains_are_reported_and_require_force(tuning, tmp_path, monkeypa
 def test_weak_present_gains_raise_warning():
     output = []
     tune(load_scene(HOVER, ["autopilot.gains=paper"]), Bandwidths(), output.append)
-    assert any(line.startswith("warning: present gains paper of the scene: roll: phase margin 2") for line in output)
+    assert any(
+        line.startswith("warning: present gains paper of the scene: roll loop: phase margin 2") for line in output
+    )
 
 
 def gains_with(tmp_path, **changes):
@@ -110,7 +117,33 @@ def test_check_warns_of_unstable_gains(tmp_path):
     assert result.exit_code == 0
     warnings = [line for line in result.output.splitlines() if "warning" in line]
     assert len(warnings) == 1
-    assert "altitude: unstable, gain margin -17.5 dB: the gain is too high" in warnings[0]
+    assert "altitude loop unstable by 17.5 dB; lower altitude of gains " in warnings[0]
+
+
+@pytest.mark.long
+def test_force_flies_unstable_gains(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    path = gains_with(tmp_path, yaw=(2000.0, 0.1, 0.001))
+    command = ["run", str(HOVER), "--set", f"autopilot.gains={path}", "--set", "run.duration=0.2"]
+    result = CliRunner().invoke(app, [*command, "--mode", "single-process", "--force"])
+    assert "lapwing: warning: yaw loop unstable" in result.output
+    assert list(tmp_path.glob("recordings/*.mcap"))
+
+
+def test_run_rejects_unstable_gains_before_take_off(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    too_high = tuple(30.0 * k for k in load("tuned").roll_inner)
+    path = gains_with(tmp_path, roll_inner=too_high, yaw=(2000.0, 0.1, 0.001))
+    command = ["run", str(HOVER), "--set", f"autopilot.gains={path}", "--mode", "single-process"]
+    result = CliRunner().invoke(app, command)
+    lines = result.output.splitlines()
+    assert result.exit_code == 2
+    assert len(lines) == 3  # an axis has one line, though three of its loops are unstable
+    assert re.fullmatch(r"lapwing: yaw loop unstable.*; (lower|raise|change) yaw of gains changed.toml", lines[0])
+    assert re.fullmatch(r"lapwing: roll loop unstable by [\d.]+ dB; lower roll_inner of gains changed.toml", lines[1])
+    assert lines[2].endswith("unstable in hover; design others with lapwing tune, or use --force")
+    assert max(map(len, lines)) <= 110
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
 
 
 def test_shipped_scenes_have_stable_gains():

@@ -8,7 +8,7 @@ import pytest
 from flight_recordings import INTERVAL, simulated
 from page_texts import page_text
 
-from lapwing.studies.flight_import.open_flight import open_flight
+from lapwing.flights.log_import.open_flight import open_flight
 from lapwing.studies.validation.closed_loop import fly_setpoints
 from lapwing.studies.validation.plant_rows import MOTION, PlantRows
 
@@ -46,8 +46,8 @@ def test_power_matches_closed_form():
     volts = np.array([[2.0, 2.5, 3.0, 3.5]] * 3)
     plant.advance(blocks, volts)
     speed = plant.read(blocks, slice(MOTION, MOTION + 4), 3)
-    layout = plant.like.parameters.layout
-    drag = next(e.torque_constant for e in plant.like.parameters.effects if hasattr(e, "torque_constant"))
+    layout = plant.example.parameters.layout
+    drag = next(e.torque_constant for e in plant.example.parameters.effects if hasattr(e, "torque_constant"))
     current = drag * speed**2 / layout.volt_per_speed + layout.no_load_current
     assert plant.power(blocks, 3) == pytest.approx((volts * current).sum(axis=1), rel=1e-9)
 
@@ -71,7 +71,7 @@ def test_command_overlays_closed_loop(log, tmp_path):
     out, page = tmp_path / "errors.json", tmp_path / "page.html"
     done = lapwing("validate", SCENE, log, "--closed-loop", "--horizons", "50", "--json", out, "--report", page)
     assert done.returncode == 0, done.stderr
-    assert "closed loop: flown" in done.stdout
+    assert "Closed loop: distance from the recorded flight" in done.stdout
     (flight,) = json.loads(out.read_text())["closed_loop"]
     assert flight["difference"] < 0.05
     assert "Closed loop with the recorded setpoints" in page_text(page)

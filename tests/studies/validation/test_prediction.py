@@ -11,7 +11,7 @@ from page_texts import page_text
 
 from lapwing.studies.validation.linear_baseline import linear_fit
 from lapwing.studies.validation.plant_rows import PlantRows
-from lapwing.studies.validation.prediction_metrics import constant_velocity, magnitudes, pool_flights
+from lapwing.studies.validation.prediction_metrics import clusters, constant_velocity, magnitudes, pool, ratios
 from lapwing.studies.validation.start_states import NO_TRIM, TrimMemory, start_states
 from lapwing.studies.validation.windows import compare, predict, thrust_ratio, window_starts
 
@@ -85,7 +85,8 @@ def test_thrust_ratio_is_inverse_mass_ratio(plant, flights, factor):
     """Thrust depends on motor commands and motion only, so twice the mass has half the specific force."""
     scene = PlantRows(SCENE, INTERVAL, [f"airframe.mass.total={factor * plant.mass[0]}"])
     (states,) = start_states(scene, flights[:1], NO_TRIM)
-    assert thrust_ratio(flights[0], window_starts(flights[0], 1, 5), states) == pytest.approx(1.0 / factor, rel=0.01)
+    starts = window_starts(flights[0], 1, 5)
+    assert thrust_ratio(flights[0], starts, states, True) == pytest.approx(1.0 / factor, rel=0.01)
 
 
 def test_linear_fit_beats_constant_velocity(flights):
@@ -98,8 +99,8 @@ def test_linear_fit_beats_constant_velocity(flights):
 
 
 def test_interval_resamples_flights_not_windows():
-    flights = [np.full((1000, 1, 5), value) for value in (1.0, 2.0, 3.0, 4.0)]
-    ((metric, *_),) = pool_flights(flights)
+    values = np.repeat([1.0, 2.0, 3.0, 4.0], 1000)[:, None, None]
+    ((metric,),) = pool(values, np.repeat(np.arange(4), 1000))
     assert metric.mean == pytest.approx(2.5)
     assert metric.low < 1.8
     assert metric.high > 3.2
@@ -107,10 +108,36 @@ def test_interval_resamples_flights_not_windows():
 
 @pytest.mark.filterwarnings("error")
 def test_quantity_without_measurement_has_no_interval():
-    flights = [np.array([[[1.0, np.nan]]]) for _ in range(4)]
-    ((known, unknown),) = pool_flights(flights)
+    ((known, unknown),) = pool(np.array([[[1.0, np.nan]]] * 4), np.arange(4))
     assert known == (1.0, 1.0, 1.0)
     assert np.isnan(unknown).all()
+
+
+@pytest.mark.parametrize("flights", [3, 5, 20])
+def test_intervals_of_few_flights_cover_true_ratio(flights):
+    draw = np.random.default_rng(1)
+    hits = 0
+    for _ in range(200):
+        hard = draw.normal(0.0, 0.5, flights)  # for plant and baseline alike
+        values, baseline = (np.exp(hard + draw.normal(0.0, 0.1, flights))[:, None, None] for _ in range(2))
+        ((metric,),) = ratios(values, baseline, np.arange(flights))
+        hits += metric.low < 1.0 < metric.high
+    assert hits > 180
+
+
+def test_few_flights_are_resampled_by_blocks_of_time():
+    starts = np.arange(0, 1000, 5)
+    assert set(clusters([starts] * 2, INTERVAL).tolist()) == set(range(10))
+    assert set(clusters([starts] * 8, INTERVAL).tolist()) == set(range(8))
+
+
+def test_linear_fit_of_single_flight_is_cross_validated(flights):
+    """Motion that the commands do not explain is not explained by overfitting."""
+    draw = np.random.default_rng(1)
+    flight = replace(flights[0], omega=draw.normal(0.0, 1.0, flights[0].omega.shape))
+    starts = window_starts(flight, 20, 12)
+    (result,) = linear_fit([flight], [starts], (20,))
+    assert np.std(result.rate) > 1.0
 
 
 def test_magnitudes_are_means_over_axes(plant, flights):
@@ -137,6 +164,13 @@ def test_command_writes_errors_and_baselines(plant, tmp_path):
     assert 0.0 < last["position"] < last["baselines"]["constant_velocity"]["position"]
     assert set(last["baselines"]) == {"constant_velocity", "linear_fit"}
     assert "Errors over the envelope" in page_text(page)
+    verdict = json.loads(out.read_text())["verdict"]
+    assert verdict["uses"]["position loops"] == "better"
+    assert f"{SCENE} on 3 flights, {last['windows']} windows: {verdict['text']}" in done.stdout.splitlines()[0]
+    assert "Good enough for position loops" in page_text(page)
+    row = next(c for c in verdict["comparisons"] if (c["signal"], c["time"]) == ("velocity", 0.5))
+    low, high = row["baselines"]["constant_velocity"]["confidence_95"]
+    assert low < last["velocity"] / last["baselines"]["constant_velocity"]["velocity"] < high < 1.0
 
 
 @pytest.mark.long

@@ -4,7 +4,11 @@ import numpy as np
 
 from lapwing.dynamics.lie.quaternion import exp
 from lapwing.dynamics.lie.ts2 import Swing, normalise
-from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters, CooperativeLoadState, LiftCommand
+from lapwing.papers.cooperative_load.cooperative_load import (
+    CooperativeLoadParameters,
+    CooperativeLoadState,
+    LiftCommand,
+)
 from lapwing.studies.accuracy.coordinates import of_state
 from lapwing.studies.accuracy.integrate import solver_methods
 from lapwing.studies.accuracy.problem import Problem

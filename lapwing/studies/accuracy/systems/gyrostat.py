@@ -3,8 +3,8 @@
 import numpy as np
 
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
-from lapwing.dynamics.vehicles.gyrostat import GyrostatParameters
 from lapwing.dynamics.vehicles.rigid_body import RigidBody
+from lapwing.papers.gyrostat import GyrostatParameters
 from lapwing.studies.accuracy.coordinates import of_state
 from lapwing.studies.accuracy.integrate import solver_methods
 from lapwing.studies.accuracy.problem import Problem

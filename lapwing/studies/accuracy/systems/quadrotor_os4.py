@@ -5,7 +5,7 @@ import math
 import numpy as np
 
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
-from lapwing.dynamics.vehicles.quadrotor_os4 import Os4Parameters, Os4State
+from lapwing.papers.quadrotor_os4 import Os4Parameters, Os4State
 from lapwing.studies.accuracy.coordinates import of_state
 from lapwing.studies.accuracy.integrate import solver_methods
 from lapwing.studies.accuracy.problem import Problem

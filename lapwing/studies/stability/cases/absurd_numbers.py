@@ -52,11 +52,11 @@ def reactions_to_states() -> dict[str, int]:
         (cooperative_load._parameters(cooperative_load.PUSHED), cooperative_load.START),
     ]
     for p, x in systems:
-        for like, check in ((x, lambda tree, p=p: (p, tree)), (p, lambda tree, x=x: (tree, x))):
-            numbers = flatten(like)
+        for example, check in ((x, lambda tree, p=p: (p, tree)), (p, lambda tree, x=x: (tree, x))):
+            numbers = flatten(example)
             for k in range(len(numbers)):
                 for value in NON_FINITE:
-                    tree = unflatten(like, (*numbers[:k], value, *numbers[k + 1 :]))
+                    tree = unflatten(example, (*numbers[:k], value, *numbers[k + 1 :]))
                     try:
                         check_start(*check(tree))
                     except ValueError as error:
@@ -68,24 +68,24 @@ def reactions_to_states() -> dict[str, int]:
 
 def reaction_to_voltage(value: float) -> tuple[str, float]:
     """Return (reaction of a plant to a voltage at tick 10, largest absolute value in its output before)."""
-    setup = resolve(load("hover", SHORT))
-    outputs = [setup.port(ports.ACTUATORS), setup.port(ports.STATUS)]
-    graph = BlockDiagram(
-        setup, [create(setup, "plant"), Service("case", [ExternalBlock("case.commands", *outputs)], [])], 2 * TICKS
+    config = resolve(load("hover", SHORT))
+    outputs = [config.port(ports.ACTUATORS), config.port(ports.STATUS)]
+    diagram = BlockDiagram(
+        config, [create(config, "plant"), Service("case", [ExternalBlock("case.commands", *outputs)], [])], 2 * TICKS
     )
-    like = setup.port(ports.ACTUATORS).like
+    example = config.port(ports.ACTUATORS).example
     last = 0
     try:
         for tick in range(TICKS):
             volts = (value if tick == TICKS // 2 else 33.0, 33.0, 33.0, 33.0)
-            graph.put(ports.ACTUATORS, tick, like._replace(motor_voltage=volts, armed=True))
-            graph.put(ports.STATUS, tick, AutopilotStatus())
-            graph.advance(tick + 1)
+            diagram.put(ports.ACTUATORS, tick, example._replace(motor_voltage=volts, armed=True))
+            diagram.put(ports.STATUS, tick, AutopilotStatus())
+            diagram.advance(tick + 1)
             last = tick
     except LockStepError as error:
-        largest = np.abs(graph.row(ports.TRUTH, last)).max()
+        largest = np.abs(diagram.row(ports.TRUTH, last)).max()
         return "reported" if "t = " in str(error) and "nan" in str(error) else "silent", float(largest)
-    largest = np.abs(graph.row(ports.TRUTH, last)).max()
+    largest = np.abs(diagram.row(ports.TRUTH, last)).max()
     return ("completed" if math.isfinite(largest) else "silent"), float(largest)
 
 

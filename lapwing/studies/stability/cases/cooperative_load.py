@@ -8,8 +8,12 @@ import numpy as np
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.lie.ts2 import Swing
 from lapwing.dynamics.vector import ZERO
-from lapwing.dynamics.vehicles.cooperative_load import CooperativeLoadParameters, CooperativeLoadState, LiftCommand
 from lapwing.kernels.state_tree import flatten
+from lapwing.papers.cooperative_load.cooperative_load import (
+    CooperativeLoadParameters,
+    CooperativeLoadState,
+    LiftCommand,
+)
 from lapwing.studies.accuracy.integrate import adapt_step
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.sampled_runs import rows

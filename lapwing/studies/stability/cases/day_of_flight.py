@@ -27,12 +27,12 @@ def growth(record_truth: bool, hours: int) -> tuple[list[float], list[float]]:
 
     `record_truth` keeps the full history of the ground truth.
     """
-    setup = resolve(load("hover", ["run.duration=86400.0", "trajectory.phase.1.duration=86390.0"]))
-    graph = BlockDiagram(setup, create_all(setup), 64, {ports.TRUTH} if record_truth else ())
+    config = resolve(load("hover", ["run.duration=86400.0", "trajectory.phase.1.duration=86390.0"]))
+    diagram = BlockDiagram(config, create_all(config), 64, {ports.TRUTH} if record_truth else ())
     memory, seconds = [], []
     for hour in range(1, hours + 1):
         started = time.process_time()  # of this process alone
-        graph.advance(min(hour * round(3600.0 / setup.interval), setup.last_tick + 1))
+        diagram.advance(min(hour * round(3600.0 / config.interval), config.last_tick + 1))
         seconds.append(time.process_time() - started)
         memory.append(resident())
     return memory, seconds

@@ -6,14 +6,14 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
+from lapwing.flights.flight_data import FlightData
+from lapwing.flights.rotation_arrays import from_xyzw
 from lapwing.kernels.cell import read
 from lapwing.messages.topics import ESTIMATE, TRUTH
 from lapwing.services.autopilot.estimator.blocks.gps_block import GpsFusion
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.accuracy.coordinates import matrices
-from lapwing.studies.flight_data import FlightData
-from lapwing.studies.rotation_arrays import from_xyzw
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 
 HARD = "a mission with a gyro bias jump, 60 s without GPS, an inverted magnetometer, or all sensors frozen"
@@ -59,20 +59,20 @@ def fly(faults: dict[str, str], extra: Sequence[str] = (), *, ignore_age: bool =
         ignore_age: treat GPS fixes as measured on arrival (baseline).
     """
     overrides = [f"run.duration={END}", *extra, *(f"sensors.{s}.faults=[{faults.get(s, NEVER)}]" for s in SENSORS)]
-    setup = resolve(load("delivery_mission", overrides))
-    services = create_all(setup)
+    config = resolve(load("delivery_mission", overrides))
+    services = create_all(config)
     if ignore_age:
         gps = next(part for service in services for part in service.parts if isinstance(part.parameters, GpsFusion))
         gps.parameters = gps.parameters._replace(age=0)
     topics = (TRUTH, ESTIMATE)
     selected = {encoder.port for service in services for encoder in service.encoders if encoder.topic in topics}
-    graph = BlockDiagram(setup, services, 64, selected)
+    diagram = BlockDiagram(config, services, 64, selected)
     filtering: Any = next(part for service in services for part in service.parts if part.name.endswith("inertial"))
     min_eigenvalue = 1.0
-    while not graph.ended and graph.tick <= setup.last_tick:
-        graph.advance(min(graph.tick + round(1.0 / setup.interval), setup.last_tick + 1))
+    while not diagram.ended and diagram.tick <= config.last_tick:
+        diagram.advance(min(diagram.tick + round(1.0 / config.interval), config.last_tick + 1))
         min_eigenvalue = min(min_eigenvalue, smallest_eigenvalue(_covariance(read(filtering.state))))
-    flight = FlightData.of(graph, topics)
+    flight = FlightData.of(diagram, topics)
     return _outcome(flight, min_eigenvalue)
 
 

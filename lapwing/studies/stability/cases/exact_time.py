@@ -14,12 +14,12 @@ HOURS = 24
 
 def run() -> CaseResult:
     """Compare integer ticks with a sum of intervals."""
-    setup = resolve(load("hover", []))
-    per_hour = 3600 * 1_000_000_000 // setup.interval_ns
+    config = resolve(load("hover", []))
+    per_hour = 3600 * 1_000_000_000 // config.interval_ns
     ticks = per_hour * np.arange(1, HOURS + 1)
-    exact = [Fraction(int(tick) * setup.interval_ns, 1_000_000_000) for tick in ticks]
-    ours = np.array([abs(float(Fraction(float(t * setup.interval)) - e)) for t, e in zip(ticks, exact, strict=True)])
-    summed = np.add.accumulate(np.full(ticks[-1], setup.interval))[ticks - 1]
+    exact = [Fraction(int(tick) * config.interval_ns, 1_000_000_000) for tick in ticks]
+    ours = np.array([abs(float(Fraction(float(t * config.interval)) - e)) for t, e in zip(ticks, exact, strict=True)])
+    summed = np.add.accumulate(np.full(ticks[-1], config.interval))[ticks - 1]
     baseline = np.array([abs(float(Fraction(float(t)) - e)) for t, e in zip(summed, exact, strict=True)])
     row = Row("clock", "integer ticks of integer nanoseconds", "error of the time [s] after 24 h", 1e-11,
               "half a unit in the last place of 86 400 s as a float; time stamps are exact integers", float(ours.max()),

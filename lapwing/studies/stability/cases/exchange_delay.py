@@ -5,14 +5,14 @@ import numpy as np
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.tick_schedule import InputPort
 from lapwing.cosim.scene import Scene
+from lapwing.flights.flight_data import FlightData
 from lapwing.messages.topics import TRUTH
 from lapwing.services.autopilot.controller_parameters import build
 from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.autopilot.margins import open_loops, stable
 from lapwing.services.autopilot.nominal_airframe import known_airframe
-from lapwing.services.common.communication_schema import Communication
+from lapwing.services.common.schemas.communication_schema import Communication
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.studies.flight_data import FlightData
 from lapwing.studies.simulate import fly
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import numpy as np
 
+from lapwing.flights.flight_data import FlightData
 from lapwing.services.scene_resolver import load
-from lapwing.studies.flight_data import FlightData
 from lapwing.studies.stability import flights, jumping_clock
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.cases.estimator import INVARIANT, SIGMAS, Outcome, fly

@@ -6,15 +6,15 @@ import numpy as np
 from scipy.integrate import quad
 
 from lapwing.dynamics.vector import ZERO
-from lapwing.dynamics.vehicles.cooperative_load import LiftCommand
-from lapwing.dynamics.vehicles.released_load import release
+from lapwing.flights.tension import pushes, tension
 from lapwing.kernels.state_tree import unflatten
 from lapwing.messages.topics import BODIES, LIFT, TRUTH
+from lapwing.papers.cooperative_load.cooperative_load import LiftCommand
+from lapwing.papers.cooperative_load.released_load import release
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 from lapwing.studies.stability.cases.cooperative_load import LENGTH, QUAD, G, bodies, formation
 from lapwing.studies.stability.flights import fly
 from lapwing.studies.stability.sampled_runs import rows
-from lapwing.studies.tension import pushes, tension
 
 HARD = "release of a swinging load; links under compression near the top, where cables would be slack"
 

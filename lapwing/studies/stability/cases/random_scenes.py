@@ -2,8 +2,8 @@
 
 import numpy as np
 
+from lapwing.flights.flight_data import FlightData
 from lapwing.services.scene_resolver import load
-from lapwing.studies.flight_data import FlightData
 from lapwing.studies.simulate import fly
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row
 from lapwing.studies.stability.flights import finite

@@ -12,7 +12,7 @@ RECOVERY_TIME = 1.0  # [s] of known position before the descent ends
 
 
 class Mode(FlightMode):
-    """Descend to the ground; once the position is known again, hold with an operator, land without."""
+    """Descend to the ground; once the position is known again, hold for an operator who waits, land without."""
 
     needs_flight, needs_position = True, False
 
@@ -26,6 +26,7 @@ class Mode(FlightMode):
             return None
         self._position_known = 0.0 if view.position_lost else self._position_known + view.dt
         if self._position_known > RECOVERY_TIME:
-            self.next_mode = "hold" if constants.has_operator else "land"
+            waits = constants.has_operator and not guidance.finish_requested
+            self.next_mode = "hold" if waits else "land"
         speed = descent_speed(constants, guidance, self._flight.altitude)
         return self._flight.step(constants, view, guidance, -speed, 0.0, (0.0, 0.0))

@@ -22,9 +22,15 @@ class Mode(FlightMode):
         if not guidance.allows(constants, self._target):
             raise ValueError("go to: the position is outside of the fence")
         self._leg = Leg(guidance.smoothing.position, self._target)
+        self._phase = f"go to {guidance.words(constants, self._target)}"
         self._yaw, speed = value(values, 3), value(values, 4)
         if speed > 0.0:
             guidance.speed = speed
+
+    @property
+    def phase(self) -> str:
+        """Text of the target, from home."""
+        return self._phase
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
         """Follow the leg."""

@@ -4,18 +4,20 @@ from lapwing.dynamics.vector import ZERO
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode
 from lapwing.services.autopilot.commander.guidance import Guidance
-from lapwing.services.autopilot.commander.smoothing import braking_speed
 
 NAME = "land"
-SLOW_HEIGHT = 3.0  # [m] estimated height below which the descent is slow
 STOPPED = 0.05  # [m/s]
 
 
 def descent_speed(constants: Constants, guidance: Guidance, altitude: float) -> float:
-    """Return the descent speed [m/s] at an altitude, world z [m]."""
-    limits, slow = guidance.limits, guidance.parameters["MPC_LAND_SPEED"]
-    above = max(0.0, altitude - constants.resting_height - SLOW_HEIGHT)
-    return max(slow, min(limits.down, slow + braking_speed(above, limits.acceleration)))
+    """Return the descent speed [m/s] at an altitude, world z [m], by PX4's three steps of a landing."""
+    p, fast = guidance.parameters, guidance.limits.down
+    height, slow = altitude - constants.resting_height - guidance.home[2], p["MPC_LAND_SPEED"]
+    if constants.height_known and height <= p["MPC_LAND_ALT3"]:
+        return p["MPC_LAND_CRWL"]
+    high, low = p["MPC_LAND_ALT1"], p["MPC_LAND_ALT2"]
+    share = (height - low) / (high - low) if high > low else float(height > low)
+    return slow + min(max(share, 0.0), 1.0) * (fast - slow)
 
 
 class Mode(FlightMode):

@@ -9,7 +9,7 @@ from lapwing.services.autopilot.commander.commander_input import CommanderInput,
 from lapwing.services.autopilot.commander.flight_mode import FlightMode, fill_in, value, vector
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.smoothing import clamp_norm
-from lapwing.services.autopilot.land_detector import CUT_HEIGHT
+from lapwing.services.autopilot.land_detector import TAKEOFF_HEIGHT
 from lapwing.services.common.ports import Setpoint
 
 NAME = "offboard"
@@ -62,7 +62,7 @@ class Mode(FlightMode):
         self.motor_voltage = volts
         (x, y, z), (vx, vy, vz) = view.estimate.position_world, view.estimate.velocity_world
         yaw = to_roll_pitch_yaw(view.estimate.attitude)[2]
-        position = (x, y, max(z, constants.resting_height + CUT_HEIGHT))
+        position = (x, y, max(z, constants.resting_height + TAKEOFF_HEIGHT))
         setpoint = Setpoint(position, (vx, vy, vz if turning else min(vz, -SINKING)), ZERO, yaw, 0.0)
         guidance.follow(setpoint)
         return setpoint

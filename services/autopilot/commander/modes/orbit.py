@@ -6,10 +6,10 @@ from lapwing.services.autopilot.commander.commander_input import CommanderInput,
 from lapwing.services.autopilot.commander.flight_mode import FlightMode, fill_in, value, vector
 from lapwing.services.autopilot.commander.guidance import Guidance
 from lapwing.services.autopilot.commander.smoothing import clamp_norm
+from lapwing.services.common.plans.route_checks import LEAST_RADIUS, MOST_RADIUS, ORBIT_RADIUS
 
 NAME = "orbit"
 TO_CENTRE, INITIAL, FREE, TANGENT, STICKS, UNCHANGED = range(6)  # ORBIT_YAW_BEHAVIOUR
-RADIUS, LEAST_RADIUS, MOST_RADIUS = 10.0, 1.0, 1000.0  # [m]
 SPEED, MOST_ACCELERATION = 1.0, 2.0  # [m/s], [m/s^2] towards the centre
 GAIN = 1.0  # [1/s] speed towards the circle over distance
 
@@ -22,7 +22,7 @@ class Mode(FlightMode):
     def __init__(self, constants: Constants, guidance: Guidance, *values: float):
         self._centre = fill_in(guidance.smoothing.position, vector(values, 0))
         radius, speed, behaviour, turns = (value(values, k) for k in range(3, 7))
-        self._radius = RADIUS if math.isnan(radius) else radius
+        self._radius = ORBIT_RADIUS if math.isnan(radius) else radius
         if not LEAST_RADIUS <= self._radius <= MOST_RADIUS:
             raise ValueError(f"orbit: expected a radius from {LEAST_RADIUS:g} to {MOST_RADIUS:g} m")
         if not all(map(math.isfinite, self._centre)) or self._centre[2] <= constants.resting_height:

@@ -5,7 +5,7 @@ import math
 from lapwing.services.autopilot.commander.commander_input import CommanderInput, Constants
 from lapwing.services.autopilot.commander.flight_mode import FlightMode, value
 from lapwing.services.autopilot.commander.guidance import Guidance
-from lapwing.services.autopilot.commander.route import MAXIMUM_TAKEOFF_HEIGHT
+from lapwing.services.common.plans.route_checks import MAXIMUM_TAKEOFF_HEIGHT
 
 NAME = "takeoff"
 REACHED = 0.1  # [m]
@@ -23,11 +23,12 @@ class Mode(FlightMode):
         if guidance.flying and guidance.smoothing.position[2] > self._height:
             raise ValueError(f"take-off: the vehicle is already above {self._height:g} m")
         self._yaw = value(values, 1)
+        self._phase = f"climb to {guidance.words(constants, (*guidance.home[:2], self._height))}"
 
     @property
     def phase(self) -> str:
         """Text of the target height."""
-        return f"to {self._height:g} m"
+        return self._phase
 
     def step(self, constants: Constants, view: CommanderInput, guidance: Guidance) -> None:
         """Climb once the motors are armed."""

@@ -13,7 +13,7 @@ from lapwing.services.common.ports import EstimateCovariance
 class CovarianceOutput(NamedTuple):
     """Parameters of the block."""
 
-    like: EstimateCovariance  # prototype of the sample
+    example: EstimateCovariance  # prototype of the sample
 
 
 @kernel
@@ -34,4 +34,4 @@ def step(
 ) -> tuple[NavigationState, tuple[EstimateCovariance], int]:
     """Output the covariance at this tick."""
     pack(s.filter.memory)
-    return s, (load(p.like, s.filter.memory.packed, 0),), CONTINUE
+    return s, (load(p.example, s.filter.memory.packed, 0),), CONTINUE

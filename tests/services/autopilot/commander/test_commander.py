@@ -1,6 +1,7 @@
 """Commander without a controller: outputs by tick, and completeness of its state."""
 
 import copy
+import math
 import pickle
 
 import pytest
@@ -9,6 +10,8 @@ from flights import command, item
 
 from lapwing.messages import CommandAck
 from lapwing.services.autopilot.commander.commander import Commander
+from lapwing.services.autopilot.commander.modes.land import descent_speed
+from lapwing.services.autopilot.commander.route import Route
 from lapwing.services.common.ports import StateEstimate
 
 WAITING = CONSTANTS._replace(has_trajectory=False)
@@ -98,6 +101,18 @@ def test_estimate_setpoint_requests_estimate_every_tick():
     assert not session.step().estimate_every_tick
 
 
+@pytest.mark.parametrize(
+    ("height", "known", "speed"),
+    [(12.0, False, 1.5), (10.0, False, 1.5), (7.5, False, 1.1), (5.0, False, 0.7), (0.5, False, 0.7), (1.1, True, 0.7),
+     (0.9, True, 0.3), (-2.0, True, 0.3)],
+)  # fmt: skip
+def test_descent_has_the_three_steps_of_px4_above_home(height, known, speed):
+    constants, guidance = CONSTANTS._replace(height_known=known), in_the_air().commander.state.guidance
+    guidance.home = (0.0, 0.0, 100.0)
+    altitude = 100.0 + constants.resting_height + height
+    assert descent_speed(constants, guidance, altitude) == pytest.approx(speed)
+
+
 def test_after_landing_controller_is_reset_and_vehicle_disarms():
     session = in_the_air(command("land"))
     assert not session.step().reset_controller
@@ -134,4 +149,88 @@ def test_unreachable_takeoff_item_is_skipped():
     assert session.run(0.1).status.mission_current == 1  # already above the item's altitude
     session.step(commands=(command("mission_upload", items=[item("takeoff", z=2000.0)]),))
     assert session.acknowledgements[-1].result == CommandAck.DENIED
-    assert session.texts[-1] == "item 0: expected a take-off to at most 1000 m"
+    assert session.texts[-1] == "item 1: take-off to 2000 m; expected at most 1000 m"
+
+
+SPEED = item("speed", values=(2.0,))
+WAYPOINT = item("waypoint", 9.0, 2.0, 4.0)
+CIRCLES = {
+    "jump to itself": [WAYPOINT, item("jump", values=(1.0, 1e9))],
+    "two jumps": [WAYPOINT, item("jump", values=(2.0, 1e9)), item("jump", values=(1.0, 1e9))],
+    "jump over a speed": [WAYPOINT, SPEED, item("jump", values=(1.0, 1e9))],
+    "zero delay": [WAYPOINT, item("delay"), item("jump", values=(1.0, 1e9))],
+}
+
+
+@pytest.mark.parametrize("items", CIRCLES.values(), ids=CIRCLES)
+def test_jumps_in_circle_are_denied(items):
+    session = in_the_air(command("mission_upload", items=items))
+    assert session.acknowledgements[-1].result == CommandAck.DENIED
+    assert session.texts[-1].endswith("jumps in a circle without a waypoint; jump to a waypoint")
+    assert not session.commander.state.guidance.route.items
+
+
+@pytest.mark.parametrize("repetitions", [1.0, 1e9])
+def test_circle_with_waypoint_is_flown(repetitions):
+    items = [
+        WAYPOINT,
+        item("delay", hold=1.0),
+        item("jump", values=(1.0, repetitions)),
+        item("jump", values=(0.0, 1e9)),
+    ]
+    session = in_the_air(command("mission_upload", items=items), command("mission"))
+    assert session.acknowledgements[-1].result == CommandAck.ACCEPTED
+    session.run(6.0)
+    assert session.step().status.mode == "mission"
+
+
+def test_search_of_following_items_is_bounded():
+    jumps = [item("jump", values=(float(k + 1), 1e9)) for k in range(1, 400)]
+    following = [*Route([WAYPOINT, *jumps, item("yaw", yaw=0.0), item("jump", values=(1.0, 1e9))]).following(32)]
+    assert [i.action for i in following] == ["yaw"] * 32
+    assert [*Route([WAYPOINT]).following(32)] == []
+
+
+def test_first_position_must_be_near():
+    far = [item("takeoff", z=3.0), item("waypoint", 602.0, 802.0, 3.0)]
+    session = in_the_air(command("parameter", 1000.0, text="MIS_DIST_1WP"), command("mission_upload", items=far))
+    assert session.acknowledgements[-1].result == CommandAck.DENIED
+    assert session.texts[-1] == "item 2: 1001 m from the start; expected at most 1000 m (MIS_DIST_1WP)"
+    session.step(commands=(command("parameter", 0.0, text="MIS_DIST_1WP"), command("mission_upload", items=far)))
+    assert session.acknowledgements[-1].result == CommandAck.ACCEPTED
+
+
+def test_mission_outside_fence_is_not_started():
+    ring = [item("fence_circle_in", 0.0, 0.0, 0.0, radius=5.0)]
+    session = in_the_air(command("mission_upload", items=[WAYPOINT]), command("fence_upload", items=ring))
+    session.step(commands=(command("mission"),))
+    assert session.texts[-1] == "mission: item 1 is outside of the geofence; move the item or the fence"
+
+
+@pytest.mark.parametrize(
+    ("turn", "yaw", "most"),
+    [
+        (item("yaw", yaw=-4.5, values=(1.0,)), -4.5, 0.1),
+        (item("yaw", yaw=-1.0, values=(0.0, 1.0)), 2.0 * math.pi - 1.0, 5.3),
+        (item("yaw", yaw=-1.0, values=(0.0, -1.0)), -1.0, 0.1),
+        (item("yaw", yaw=-1.0), -1.0, 0.1),
+    ],
+    ids=["far to the right", "to the left", "to the right", "the shorter way"],
+)
+def test_turn_goes_by_demanded_way(turn, yaw, most):
+    session = in_the_air(command("mission_upload", items=[turn]), command("mission"))
+    yaws = [session.step().setpoint.yaw for _ in range(round(10.0 / DT))]
+    assert yaws[-1] == pytest.approx(yaw, abs=math.radians(12.0))
+    assert min(yaw, 0.0) - 0.1 < min(yaws)
+    assert max(yaws) < most
+
+
+def test_phases_are_words_from_home():
+    session = Session(WAITING)
+    output = session.step(estimate=GROUND, commands=(command("arm"), command("takeoff", 5.35101)))
+    assert output.status.phase == "climb to 5 m up"
+    session.run(8.0)
+    assert session.step(commands=(command("goto", 1.0, 12.0, 5.35),)).status.phase == "go to 10 m north, 5 m up"
+    items = [item("waypoint", -1.5, 2.0, 2.35), item("return")]
+    session.step(commands=(command("mission_upload", items=items), command("mission")))
+    assert session.run(0.1).status.phase == "item 1 of 2: go to 2.5 m west, 2 m up"

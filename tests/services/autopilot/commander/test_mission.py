@@ -1,7 +1,7 @@
 """Complete missions of a vehicle that follows its setpoint exactly."""
 
 import math
-from itertools import groupby
+from itertools import groupby, pairwise
 
 import pytest
 from commander_session import Flight
@@ -132,7 +132,18 @@ def test_loiter_to_altitude_and_unlimited():
     assert all(math.dist(p[:2], (9.0, 0.0)) < 0.5 for p in over)  # horizontally first, then vertically
     flight.fly_for(30.0)
     assert (flight.status.mission_current, flight.status.mission_state) == (2, 3)
+    assert flight.status.phase == "item 3 of 3: hold until told otherwise at 9 m north, 9 m east, 7.65 m up"
     assert flight.setpoint.position_world == pytest.approx((9.0, 9.0, 8.0), abs=0.05)
+
+
+def test_vehicle_that_an_obstacle_holds_lands_where_it_is():
+    flight = mission(item("takeoff", z=3.0), item("waypoint", 40.0, 0.0, 3.0, hold=30.0), item("land"))
+    flight.wall = 20.0
+    assert flight.until(lambda s: s.failsafe != "")
+    assert (flight.status.failsafe, flight.status.mode) == ("an obstacle holds the vehicle", "land")
+    assert flight.setpoint.position_world[0] == pytest.approx(20.0, abs=0.1)
+    assert flight.until(lambda s: not s.armed)
+    assert "an obstacle holds the vehicle" in "".join(flight.texts)
 
 
 def test_heading_follows_region_of_interest():
@@ -167,6 +178,23 @@ def test_mission_items_set_relative_yaw_and_home():
     assert flight.setpoint.yaw == pytest.approx(-1.0, abs=math.radians(12.0))
     assert flight.until(lambda s: s.mission_state == 5)
     assert flight.setpoint.position_world[:2] == pytest.approx((0.0, 9.0), abs=0.3)
+
+
+@pytest.mark.parametrize("turns", [1.5, -1.0])
+def test_mission_circles_around_position_as_often_as_asked(turns):
+    values = (turns * math.tau, 2.0, math.nan)
+    circle = item("orbit", 20.0, 0.0, 6.0, radius=5.0, values=values)
+    flight = mission(item("takeoff", z=3.0), circle, item("waypoint", 0.0, 0.0, 6.0))
+    assert flight.until(lambda s: s.mission_current == 1)
+    flight.track.clear()
+    assert flight.until(lambda s: s.mission_current == 2)
+    places = [s.position_world for s, _ in flight.track]
+    on_circle = [p for p in places if math.dist(p[:2], (20.0, 0.0)) < 5.5]
+    steps = [math.remainder(math.atan2(b[1], b[0] - 20.0) - math.atan2(a[1], a[0] - 20.0), math.tau)
+             for a, b in pairwise(on_circle)]  # fmt: skip
+    assert sum(steps) == pytest.approx(turns * math.tau, abs=0.5)
+    assert places[-1][2] == pytest.approx(6.0, abs=0.1)
+    assert flight.until(lambda s: s.mission_state == 5)
 
 
 def test_orbit_faces_its_centre():

@@ -7,8 +7,9 @@ import pytest
 from commander_session import Flight
 from flights import command, item
 
-from lapwing.services.autopilot.commander.fence import Fence
 from lapwing.services.autopilot.commander.geofence_routing import route_around
+from lapwing.services.common.plans.fence import Fence
+from lapwing.services.common.plans.route_checks import forbidden_by
 
 BOX = [(10.0, -15.0), (20.0, -15.0), (20.0, 10.0), (10.0, 10.0)]
 
@@ -85,3 +86,9 @@ def test_return_waits_at_configured_height():
     start = flight.time
     assert flight.until(lambda s: s.mode == "land")
     assert flight.time - start == pytest.approx(5.0, abs=0.1)
+
+
+def test_circle_that_leaves_the_fence_is_refused():
+    fence = Fence([item("fence_circle_in", 0.0, 0.0, 0.0, radius=12.0)])
+    assert forbidden_by(fence, item("orbit", 8.0, 0.0, 6.0, radius=5.0, values=(6.0, 2.0, math.nan)))
+    assert not forbidden_by(fence, item("orbit", 6.0, 0.0, 6.0, radius=5.0, values=(6.0, 2.0, math.nan)))

@@ -28,13 +28,13 @@ def imported_modules(path, known):
 
 def test_imports_are_acyclic_and_below_commander():
     result = modules()
-    graph = {name: set(imported_modules(path, set(result))) - {name} for name, path in result.items()}
-    order = list(TopologicalSorter(graph).static_order())  # raises CycleError, with the cycle
+    diagram = {name: set(imported_modules(path, set(result))) - {name} for name, path in result.items()}
+    order = list(TopologicalSorter(diagram).static_order())  # raises CycleError, with the cycle
     assert len(order) == len(result) > 20
-    assert [name for name in graph if f"{PACKAGE}.commander" in graph[name]] == []
-    for name in graph:
+    assert [name for name in diagram if f"{PACKAGE}.commander" in diagram[name]] == []
+    for name in diagram:
         if name.startswith(f"{PACKAGE}.modes"):
-            assert f"{PACKAGE}.state" not in graph[name]
+            assert f"{PACKAGE}.state" not in diagram[name]
 
 
 def test_every_module_of_mode_is_in_table():

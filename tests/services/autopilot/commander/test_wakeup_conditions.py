@@ -10,11 +10,7 @@ from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from lapwing.services.autopilot.commander.commander import Commander
-from lapwing.services.autopilot.commander.wakeup_conditions import (
-    BatteryThresholds,
-    battery_thresholds,
-    needs_wakeup,
-)
+from lapwing.services.autopilot.commander.wakeup_conditions import BatteryThresholds, battery_thresholds, needs_wakeup
 from lapwing.services.common.ports import StateEstimate
 
 pytestmark = pytest.mark.long
@@ -155,6 +151,7 @@ def check_same(vehicle, flight, orders=()):
             return
 
 
+@pytest.mark.nightly
 @settings(max_examples=150, deadline=None)
 @given(st.lists(spells, min_size=1, max_size=12), st.tuples(*[st.integers(0, 4)] * 5), st.sampled_from([0.1, 0.5, 2.0]))
 @example([(7, {}), (3, {"health": GPS_LOST}), (90, {})] * 2, (4,) * 5, 0.1)

@@ -13,7 +13,7 @@ from lapwing.studies.simulate import fly
 DEAD_RECKONING = """
 import numpy as np
 from scipy.spatial.transform import Rotation
-from lapwing.services.common.estimator_api import StateEstimate
+from lapwing.services.autopilot.custom.estimator_api import StateEstimate
 
 class DeadReckoning:
     rate = 250.0

@@ -9,10 +9,12 @@ from pymavlink.dialects.v20 import all as mavlink
 from lapwing.dynamics.geodesy import Home
 from lapwing.messages import MissionItem, Vector3
 from lapwing.services.ardupilot import modes as ardupilot
-from lapwing.services.common.firmware.link import FirmwareError
+from lapwing.services.common.firmware.link import LinkReport
 from lapwing.services.common.firmware.mission_client import REJECTIONS, MissionClient, Stage, poll_flight
-from lapwing.services.common.firmware.mission_messages import mission_messages
+from lapwing.services.common.firmware.parameter_client import parameters_in
+from lapwing.services.common.firmware.program import FirmwareError
 from lapwing.services.common.mavlink.geo_coordinates import Datum
+from lapwing.services.common.mavlink.mission_export import to_mavlink
 from lapwing.services.px4 import modes as px4
 
 HOME = Home(40.0, 14.0, 100.0)
@@ -25,8 +27,6 @@ ITEMS = (
 class Vehicle:
     """Vehicle's end of the link, also the transport."""
 
-    where = "a test"
-
     def __init__(self, arm_rejections=0, uploads_rejected=0):
         """Create a vehicle that rejects arming `arm_rejections` times and a mission `uploads_rejected` times."""
         self.codec = mavlink.MAVLink(None, srcSystem=7, srcComponent=1)
@@ -34,7 +34,7 @@ class Vehicle:
         self.out, self.items, self.sent = b"", {}, []
         self.parameters = {"COM_RC_IN_MODE": (0, mavlink.MAV_PARAM_TYPE_INT32), "MPC_XY_VEL_MAX": (12.0, 9)}
         self.arm_rejections, self.uploads_rejected, self.count = arm_rejections, uploads_rejected, 0
-        self.armed, self.closed = False, False
+        self.armed, self.fixed = False, ()
 
     def receive(self):
         data, self.out = self.out, b""
@@ -44,9 +44,6 @@ class Vehicle:
         for message in self.reader.parse_buffer(data) or ():
             self.sent.append(message)
             getattr(self, message.get_type().lower(), lambda _: None)(message)
-
-    def close(self):
-        self.closed = True
 
     def emit(self, message):
         self.out += message.pack(self.codec)
@@ -81,10 +78,12 @@ class Vehicle:
         self.emit(mavlink.MAVLink_command_ack_message(message.command, result))
 
     def param_request_read(self, message):
-        value, kind = self.parameters[message.param_id]
-        self.value(message.param_id, value, kind)
+        if message.param_id in self.parameters:
+            self.value(message.param_id, *self.parameters[message.param_id])
 
     def param_set(self, message):
+        if message.param_id in self.fixed:
+            return
         value = message.param_value
         if message.param_type == mavlink.MAV_PARAM_TYPE_INT32:
             value = struct.unpack("<i", struct.pack("<f", value))[0]
@@ -104,8 +103,9 @@ def fly(vehicle, client, seconds, begin=0.0):
         client.poll(begin + 0.02 * k)
 
 
-def make(vehicle, conventions=px4.CONVENTIONS, parameters=()):
-    return MissionClient(vehicle, conventions, mission_messages(ITEMS, Datum(HOME, 0.1, 0.1)), dict(parameters))
+def make(vehicle, conventions=px4.CONVENTIONS, parameters=(), **others):
+    items = to_mavlink(ITEMS, mavlink.MAV_MISSION_TYPE_MISSION, Datum(HOME, 0.1, 0.1))
+    return MissionClient(vehicle, conventions, items, dict(parameters), **others)
 
 
 def test_mission_is_uploaded_and_started():
@@ -138,6 +138,28 @@ def test_parameters_are_set_with_their_types():
     assert client.stage is Stage.FLYING
 
 
+@pytest.mark.parametrize(("sets", "mode"), [(True, 3), (False, 0)])
+def test_parameters_that_firmware_does_not_take_are_reported(sets, mode):
+    vehicle = Vehicle()
+    vehicle.fixed = ("MPC_XY_VEL_MAX",)
+    parameters, optional = {"MPC_XY_VEL_MAX": 5.0, "NO_SUCH": 1.0}, {"OLD_NAME": 1.0, "COM_RC_IN_MODE": 3.0}
+    client = make(vehicle, parameters=parameters, sets=sets, optional=optional)
+    fly(vehicle, client, 20.0)
+    report = LinkReport("px4")
+    poll_flight(report, client, 20.1)
+    assert sorted(report.notes) == [
+        "parameter MPC_XY_VEL_MAX is 12 instead of 5",
+        "parameter NO_SUCH is unknown to it",
+    ]
+    assert client.stage is Stage.FLYING
+    assert vehicle.parameters["COM_RC_IN_MODE"][0] == mode
+
+
+@pytest.mark.parametrize("text", ["MPC_XY_VEL_MAX 5.0  # faster", "MPC_XY_VEL_MAX,5", "1\t1\tMPC_XY_VEL_MAX\t5.0\t9"])
+def test_parameter_files_of_ground_stations_are_read(text):
+    assert parameters_in(f"# a comment\n{text}\n") == {"MPC_XY_VEL_MAX": 5.0}
+
+
 def test_rejected_arming_is_retried_and_blockers_reported():
     vehicle = Vehicle(arm_rejections=3)
     client = make(vehicle)
@@ -160,7 +182,7 @@ def test_rejected_mission_ends_run():
     client = make(vehicle)
     fly(vehicle, client, REJECTIONS + 5.0)
     with pytest.raises(FirmwareError, match=r"px4: the mission is rejected \(mav_mission_no_space\)"):
-        poll_flight("px4", client, 30.0)
+        poll_flight(LinkReport("px4"), client, 30.0)
 
 
 def test_disarming_finishes_flight_and_failsafe_is_reported():
@@ -169,10 +191,10 @@ def test_disarming_finishes_flight_and_failsafe_is_reported():
     fly(vehicle, client, 3.0)
     vehicle.beat()
     vehicle.emit(mavlink.MAVLink_statustext_message(3, b"Failsafe activated: RTL\t"))
-    assert poll_flight("px4", client, 3.5).text == "Failsafe activated: RTL"
+    assert poll_flight(LinkReport("px4"), client, 3.5).text == "Failsafe activated: RTL"
     vehicle.armed = False
     vehicle.beat()
-    assert poll_flight("px4", client, 4.0).finished
+    assert poll_flight(LinkReport("px4"), client, 4.0).finished
 
 
 def test_restarted_firmware_gets_mission_and_is_armed():

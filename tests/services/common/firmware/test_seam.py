@@ -1,9 +1,12 @@
 """Common parts of firmware adapters: motor order, volts, time-outs, playback of recorded commands."""
 
 import json
+import os
 import re
 import subprocess
 import sys
+from functools import partial
+from pathlib import Path
 
 import pytest
 
@@ -14,15 +17,15 @@ from lapwing.cosim.processes.patience import Patience
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.runs.resimulate import resimulate
 from lapwing.runs.single_process_run import fly_single
-from lapwing.services.betaflight import service as betaflight
+from lapwing.services.betaflight import link as betaflight
 from lapwing.services.common.firmware import hold
 from lapwing.services.common.firmware.hold import FirmwareCommand, HeldState, Hold
-from lapwing.services.common.firmware.link import FirmwareError, FirmwareOutput, LinkReport
+from lapwing.services.common.firmware.link import FirmwareOutput, LinkReport
 from lapwing.services.common.firmware.motor_order import QUADROTOR_X, Output, motor_order
-from lapwing.services.common.firmware.program import Program
+from lapwing.services.common.firmware.program import FirmwareError, Program
 from lapwing.services.common.firmware.service import firmware_service
 from lapwing.services.common.ports import BatteryReading
-from lapwing.services.common.vehicle_schema import airframe
+from lapwing.services.common.schemas.vehicle_schema import airframe
 from lapwing.services.scene_resolver import load, resolve
 from tests.participants import running
 
@@ -81,16 +84,17 @@ class TakeoffLink:
     """Link whose firmware takes off at 0.2 s: rotors in the firmware's order get 0.6."""
 
     opened = closed = 0
+    output, unrepeatable = "", "scripted"  # resimulated by its recorded commands
 
-    def __init__(self, setup):
-        self._setup, self.report = setup, LinkReport("betaflight", "scripted")
+    def __init__(self, config):
+        self._config, self.report = config, LinkReport("betaflight", "scripted")
 
     def open(self, waits):
         waits("nothing")
         type(self).opened += 1
 
-    def step(self, tick, read, waits):
-        on = tick * self._setup.interval > 0.2
+    def step(self, tick, read):
+        on = tick * self._config.interval > 0.2
         assert len(read("truth").rotor_speed) == 4
         return FirmwareOutput((0.6,) * 4 if on else (0.0,) * 4, on, not on, False, "test" if on else "ground")
 
@@ -106,14 +110,12 @@ class Counted(TakeoffLink):
 
 
 class NonFiniteLink(TakeoffLink):
-    def step(self, tick, read, waits):
+    def step(self, tick, read):
         return FirmwareOutput((float("nan"),) * 4, True)
 
 
 def with_link(monkeypatch, link):
-    monkeypatch.setattr(
-        betaflight, "create", lambda setup, recorded=None: firmware_service(setup, "betaflight", link, recorded)
-    )
+    monkeypatch.setattr(betaflight, "create", partial(firmware_service, name="betaflight", link=link))
 
 
 def test_recorded_commands_fly_again_to_recorded_digest(tmp_path, monkeypatch):
@@ -175,7 +177,7 @@ def lapwing_check(folder, scene, *options):
 
 
 def test_firmware_vehicle_leaves_ground(monkeypatch, tmp_path):
-    from lapwing.flight import Flight
+    from lapwing.api.flight import Flight
 
     with_link(monkeypatch, TakeoffLink)
     log = tmp_path / "flight.mcap"
@@ -205,13 +207,31 @@ def test_mavlink_is_rejected_with_reason(tmp_path):
     assert "--mavlink: betaflight flies the vehicle" in done.stderr
 
 
-def setup_of(command):
+def config_of(command):
     return resolve(load("betaflight_quad", QUAD)).services["betaflight"].parameters._replace(command=tuple(command))
+
+
+def test_temporary_folder_of_killed_run_is_removed(tmp_path):
+    """A worker of a campaign that is stopped ends without any cleaning; its firmware writes until the end."""
+    script = """
+import os
+from lapwing.services.common.firmware.program import Program
+from tests.services.firmware_links import firmware_setup
+loop = "while true; do echo x > file; done"
+print(Program(firmware_setup("px4", None, 0, command=("sh", "-c", loop))).directory, flush=True)
+os._exit(1)
+"""
+    environment = {**os.environ, "TMPDIR": str(tmp_path)}
+    done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, env=environment, check=False)
+    folder, patience = Path(done.stdout.strip()), Patience(60.0)
+    assert folder.parent == tmp_path, done.stderr
+    while folder.exists():
+        assert not patience.over
 
 
 def test_program_and_its_children_end():
     script = "import subprocess,sys,time; p=subprocess.Popen(['sleep','60']); print(p.pid, flush=True); time.sleep(60)"
-    program = Program(setup_of([sys.executable, "-c", script]))
+    program = Program(config_of([sys.executable, "-c", script]))
     patience = Patience(60.0)
     while not program.text() and not patience.over:
         program.check()
@@ -225,13 +245,15 @@ def test_program_and_its_children_end():
 
 def test_missing_program_is_reported():
     with pytest.raises(FirmwareError, match=r"cannot start no-such-program .*check autopilot.command"):
-        Program(setup_of(["no-such-program"]))
+        Program(config_of(["no-such-program"]))
 
 
 def test_early_end_shows_last_output():
-    program = Program(setup_of([sys.executable, "-c", "print('bad board'); raise SystemExit(3)"]))
+    program = Program(config_of([sys.executable, "-c", "print('bad board'); raise SystemExit(3)"]))
     program._process.wait()
-    with pytest.raises(FirmwareError, match=r"the program ended \(exit code 3\) at t = 1 s: bad board"):
+    with pytest.raises(
+        FirmwareError, match=r"the program ended \(exit code 3\) at t = 1 s; its last output: bad board"
+    ):
         program.check(" at t = 1 s")
     program.close()
 

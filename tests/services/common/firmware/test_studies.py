@@ -1,16 +1,12 @@
 """Studies of a scene that a foreign firmware flies: one line that names the fault, and no traceback."""
 
-import subprocess
-import sys
-
 import pytest
+
+from tests.services.firmware_links import lapwing
 
 
 def error_of(code, *arguments):
-    command = [sys.executable, "-m", "lapwing", *arguments]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
-    assert done.returncode == code, done.stdout + done.stderr
-    (line,) = done.stderr.splitlines()
+    (line,) = lapwing(*arguments, code=code).stderr.splitlines()
     return line
 
 

@@ -1,0 +1,1 @@
+"""Public interface: functions, flights and simulators that `import lapwing` offers."""

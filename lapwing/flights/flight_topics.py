@@ -1,0 +1,127 @@
+"""Recorded topics of a flight."""
+
+from collections.abc import Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.flights.flight_provenance import Origin
+from lapwing.flights.topic_view import TopicView
+from lapwing.messages.digest import Digest
+from lapwing.messages.topics import Topic, topic_named
+
+
+class FlightTopics:
+    """Topics of one vehicle's flight, by name without that of the vehicle.
+
+    Attributes:
+        origin: log or run configuration, with the log's metadata.
+        vehicle: name of the vehicle.
+    """
+
+    def __init__(self, topics: Mapping[str, TopicView], origin: Origin):
+        """Create from topics by name without that of the vehicle: "ground_truth", "gps/fix", "clock"."""
+        self.origin, self.vehicle = origin, origin.vehicle
+        self._topics = dict(topics)
+
+    @property
+    def config(self) -> RunConfig:
+        """Run configuration of the flight.
+
+        Raises:
+            ValueError: the log has no run configuration, or one that this version cannot read.
+        """
+        return self.origin.config
+
+    @property
+    def metadata(self) -> dict[str, str]:
+        """Metadata of the log: scene, seed, mode, version, digest and more."""
+        return self.origin.metadata
+
+    @cached_property
+    def digest(self) -> str:
+        """Digest of the deterministic messages: that of the log ("" if its end is missing), or of the topics."""
+        if self.origin.recorded:
+            return self.metadata.get("digest", "")
+        digest = Digest()
+        for name in self.topics:
+            topic = topic_of(name)
+            if topic.recorded and topic.deterministic:
+                for time_ns, payload in self.topic(name).payloads():
+                    digest.update(topic.key(self.vehicle), time_ns, payload)
+        return digest.hexdigest()
+
+    @property
+    def truth(self) -> TopicView:
+        """True state: position, orientation, velocity, angular_velocity, acceleration, rotor_speed, wind, ..."""
+        return self.topic("ground_truth")
+
+    @property
+    def setpoint(self) -> TopicView:
+        """Setpoint that the autopilot follows: position, velocity, acceleration, yaw, phase."""
+        return self.topic("setpoint")
+
+    @property
+    def actuators(self) -> TopicView:
+        """Commands of the autopilot: motor_voltage [V], thrust [N], attitude_reference [rad], armed."""
+        return self.topic("actuators")
+
+    @property
+    def estimate(self) -> TopicView:
+        """State estimate and its standard deviations: position, position_std, velocity, ..."""
+        return self.topic("estimate")
+
+    @property
+    def status(self) -> TopicView:
+        """Status of the autopilot: phase, armed, landed, finished, warnings."""
+        return self.topic("status")
+
+    @property
+    def topics(self) -> list[str]:
+        """Names of all topics."""
+        return sorted(self._topics)
+
+    def topic(self, name: str) -> TopicView:
+        """Return a topic by name without that of the vehicle, for example "gps/fix".
+
+        Raises:
+            ValueError: the topic does not exist; the message lists the topics.
+        """
+        if name not in self._topics:
+            raise ValueError(f"{self.origin.source}: no topic {name}; expected one of {', '.join(self.topics)}")
+        return self._topics[name]
+
+    def has(self, topic: str) -> bool:
+        """Return True if the flight has this topic."""
+        return topic in self._topics
+
+    def times(self, topic: str) -> np.ndarray:
+        """Return the simulation times of a topic [s], shape (n,)."""
+        return self.topic(topic).times
+
+    def column(self, topic: str, field: str) -> np.ndarray:
+        """Return a field of a topic by its dotted name, "pose.position" or "thrust", shape (n,) or (n, k)."""
+        return self.topic(topic)[field]
+
+    def to_dataframe(self, topic: str = "ground_truth") -> Any:
+        """Return a topic as a pandas DataFrame: a column per number or text, times [s] as index.
+
+        Raises:
+            ImportError: pandas is not installed.
+        """
+        try:
+            import pandas
+        except ImportError:
+            raise ImportError("to_dataframe: pandas is not installed; pip install lapwing[dataframe]") from None
+        view = self.topic(topic)
+        return pandas.DataFrame(view.flat(), index=pandas.Index(view.times, name="time"))
+
+
+def topic_of(name: str) -> Topic:
+    """Return the topic of a name without that of the vehicle. Raise ValueError if there is none."""
+    try:
+        return topic_named(f"{{vehicle}}/{name}")
+    except ValueError:
+        return topic_named(name)

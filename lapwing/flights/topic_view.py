@@ -1,0 +1,119 @@
+"""Messages of one topic of a flight as arrays over time."""
+
+from collections.abc import Iterator, Mapping
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from lapwing.flights import tracking
+
+
+class TopicView:
+    """View of the n messages of a topic: every field is an attribute, an array whose first axis is time.
+
+    `truth.velocity` has shape (n, 3), `actuators.motor_voltage` (n, 4), `setpoint.yaw` (n,), `setpoint.phase` (n,) of
+    str. `view["pose.position.x"]` is any field by its dotted name. Where the message has a pose, or one for each of k
+    bodies, `position` [m] and `orientation` (x, y, z, w) are those of the pose, shape (n, 3) or (n, k, 3).
+    """
+
+    def __init__(self, times_ns: np.ndarray, columns: Mapping[str, Any]):
+        """Create from simulation times [ns], int64, shape (n,), and columns by dotted field name."""
+        self._times_ns, self._columns = times_ns, columns
+        self._texts: dict[str, np.ndarray] = {}  # cache of text fields, which are slow to decode
+
+    def payloads(self) -> Iterator[tuple[int, bytes]]:
+        """Yield time [ns] and CDR of each message."""
+        return zip(self._times_ns.tolist(), self._columns.payloads(), strict=True)  # type: ignore[attr-defined]
+
+    @cached_property
+    def times(self) -> np.ndarray:
+        """Simulation times [s], shape (n,)."""
+        return self._times_ns * 1e-9
+
+    @cached_property
+    def stamps(self) -> np.ndarray:
+        """Header stamps [s], shape (n,): times at which the content of the messages is valid."""
+        seconds, rest = self["header.stamp.sec"].astype(np.int64), self["header.stamp.nanosec"]
+        return (seconds * 1_000_000_000 + rest) * 1e-9
+
+    @property
+    def position(self) -> np.ndarray:
+        """Field `position`, or position of the pose [m], world, shape (n, 3)."""
+        return self._of_pose("position", slice(0, 3))
+
+    @property
+    def orientation(self) -> np.ndarray:
+        """Field `orientation`, or orientation of the pose: unit quaternions x, y, z, w, shape (n, 4)."""
+        return self._of_pose("orientation", slice(3, 7))
+
+    @cached_property
+    def attitude(self) -> np.ndarray:
+        """Roll, pitch, yaw of the pose [rad], shape (n, 3); yaw without jumps."""
+        return tracking.roll_pitch_yaw(self.orientation)
+
+    @cached_property
+    def tilt_cosine(self) -> np.ndarray:
+        """Cosine of the pose's tilt from the vertical, shape (n,); 1 where the attitude is not recorded."""
+        try:
+            x, y = self.orientation[:, 0], self.orientation[:, 1]
+        except AttributeError:
+            return np.ones(len(self.times))
+        return 1.0 - 2.0 * (x * x + y * y)
+
+    @property
+    def fields(self) -> list[str]:
+        """Dotted names of the fields that all messages have."""
+        return list(self._columns)
+
+    def flat(self) -> dict[str, np.ndarray]:
+        """Return every number and text as a column (n,): "pose.position.x", "rotor_speed.0", "phase"."""
+        result: dict[str, np.ndarray] = {}
+        for name in self._columns:
+            column = self[name]
+            if column.ndim == 1:
+                result[name] = column
+            elif f"{name}.0" not in self._columns and not any(n.startswith(f"{name}.") for n in self._columns):
+                result |= {f"{name}.{k}": column[:, k] for k in range(column.shape[1])}
+        return result
+
+    def __getitem__(self, name: str) -> np.ndarray:
+        """Return a field by its dotted name; str, or tuples of str, as objects.
+
+        Raises:
+            KeyError: not all messages have this field.
+        """
+        if name in self._texts:
+            return self._texts[name]
+        column = self._columns[name]
+        if isinstance(column, np.ndarray):
+            return column
+        if any(isinstance(value, tuple) for value in column):
+            result = np.empty(len(column), object)
+            result[:] = column
+        else:
+            result = np.array(column)
+        self._texts[name] = result
+        return result
+
+    def __getattr__(self, name: str) -> np.ndarray:
+        if name.startswith("_"):
+            raise AttributeError(name)
+        try:
+            return self[name]
+        except KeyError as error:
+            raise AttributeError(error.args[0]) from None
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *(name for name in self._columns if "." not in name)]
+
+    def __len__(self) -> int:
+        return len(self._times_ns)
+
+    def _of_pose(self, name: str, part: slice) -> np.ndarray:
+        for candidate in (name, f"pose.{name}"):
+            if candidate in self._columns:
+                return self[candidate]
+        if "pose" not in self._columns:
+            raise AttributeError(name)
+        return self["pose"][..., part]

@@ -1,0 +1,1 @@
+"""Export of compiled blocks as native libraries and FMUs."""

@@ -1,0 +1,1 @@
+"""FMUs as services of a run."""

@@ -1,0 +1,1 @@
+"""Systems of the three source papers; docs/papers.md lists their tables and the commands that reproduce them."""

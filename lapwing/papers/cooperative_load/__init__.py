@@ -1,0 +1,1 @@
+"""Quadrotors that carry a load by rigid links."""

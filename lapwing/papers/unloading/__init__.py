@@ -1,0 +1,1 @@
+"""Self-unloading crate of the delivery quadcopter (Machines 2023, 11, 464)."""

@@ -1,0 +1,1 @@
+"""Results of the studies on the console, as JSON, and as pages."""

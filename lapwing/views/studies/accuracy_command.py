@@ -1,0 +1,197 @@
+"""`lapwing accuracy`: study of a target, with printed, written and plotted results."""
+
+import sys
+import threading
+from pathlib import Path
+from typing import NamedTuple
+
+from rich.box import SIMPLE
+from rich.console import Console
+
+from lapwing.kernels import statistics
+from lapwing.services.plant.schema import Solver
+from lapwing.studies import json_file
+from lapwing.studies.accuracy import error_budget, round_off, scenes
+from lapwing.studies.accuracy.error_budget import ErrorSource
+from lapwing.studies.accuracy.problem import Problem
+from lapwing.studies.accuracy.round_off import RoundOff
+from lapwing.studies.accuracy.targets import find, scene_of
+from lapwing.studies.accuracy.work_precision import (
+    Point,
+    cheapest,
+    check_target,
+    measure,
+    pareto_points,
+    smallest_error,
+)
+from lapwing.studies.effects.cost import costs
+from lapwing.studies.effects.variants import tables_of
+from lapwing.views import terminal
+from lapwing.views.studies import accuracy_plot
+from lapwing.views.terminal import table
+
+WIDTH = 120  # characters of a table without a terminal
+SLOW = 3.0  # [s] after which the reason is printed
+GOAL = 1e-6  # error of the first line without another one
+STRICTER = 0.1  # ratio of the smaller error whose cost the first line has
+
+
+class Study(NamedTuple):
+    """Result of `lapwing accuracy` for a system or a scene."""
+
+    target: str
+    problem: Problem
+    points: list[Point]
+    goal: float  # error for which a solver is selected
+    selected: Point | None  # cheapest point that meets the goal; None if none does
+    parts: list[ErrorSource]  # error sources of a scene's flight
+    rounding: RoundOff | None  # None for a problem without steps in extended precision
+    cost: tuple[float, float] | None  # [ns] of a plant step of a scene with contact: hovering, on the ground
+
+
+def console() -> Console:
+    """Return the console, of fixed width if the output is redirected."""
+    return terminal.console(None if sys.stdout.isatty() else WIDTH)
+
+
+def study(screen: Console, target: str, overrides: list[str], goal: float | None) -> Study:
+    """Study one target.
+
+    Args:
+        screen: console for progress messages.
+        target: name of a problem, or path of a scene.
+        overrides: "key=value" of the scene.
+        goal: error for which the cheapest solver is selected; None: that of the scene, or `GOAL`.
+
+    Raises:
+        ValueError: the target or goal is invalid, or no method meets a given goal.
+    """
+    check_target(goal)
+    scene = scene_of(target, overrides)
+    problem = scenes.problem(scene) if scene else find(target)
+    compiled = statistics().compiled
+
+    def notify() -> None:
+        screen.print("compiling, and measuring ..." if statistics().compiled > compiled else "measuring ...")
+
+    notice = threading.Timer(SLOW, notify)
+    notice.daemon = True
+    notice.start()
+    try:
+        points = measure(problem)
+        asked = goal or (scene and scene.each_vehicle[0][Solver].accuracy) or GOAL
+        reached = goal is not None or any(p.error <= asked for p in points)
+        selected = cheapest(points, asked) if reached else None
+        parts = error_budget.errors(scene) if scene else []
+        cost = costs(scene, [tables_of(scene)])[0][:2] if scene and error_budget.has_contact(scene) else None
+        return Study(target, problem, points, asked, selected, parts, round_off.measure(problem), cost)
+    finally:
+        notice.cancel()
+
+
+def show(screen: Console, study: Study) -> None:
+    """Print the answer, the table of the points, and the error sources of a scene's flight."""
+    screen.print(answer(study), highlight=False, soft_wrap=True)
+    show_points(screen, study.problem, study.points, study.rounding)
+    if study.parts:
+        show_error_sources(screen, study.parts, study.cost)
+
+
+def write_json(path: Path, study: Study) -> None:
+    """Write all points, and for a scene its error sources and the cost [ns] of a plant step."""
+    data = {
+        "target": study.target,
+        "title": study.problem.title,
+        "duration": study.problem.duration,
+        "time_unit": study.problem.unit,
+        "reference": study.problem.source,
+        "points": study.points,
+        "target_error": study.goal,
+        "cheapest": study.selected,
+        "round_off": study.rounding,
+        "error_sources": study.parts,
+        "step_ns": dict(zip(("hovering", "in contact"), study.cost, strict=True)) if study.cost else None,
+    }
+    json_file.write_json(path, data)
+
+
+def plot(path: Path, study: Study) -> None:
+    """Plot error over CPU time."""
+    accuracy_plot.draw(path, study.problem.title, study.points, study.parts, study.goal, study.selected)
+
+
+LEVELS = [10.0**-k for k in range(2, 11, 2)]  # errors for which the cheapest points are printed
+
+
+def setting(point: Point, unit: str) -> str:
+    """Format the step or tolerance of a point."""
+    if point.unit == "tol":
+        return f"tol {point.setting:.0e}"
+    return f"{1e3 * point.setting:.3g} ms" if unit == "s" and point.setting < 1.0 else f"{point.setting:.3g} {unit}"
+
+
+def answer(study: Study) -> str:
+    """Return the cheapest solver for the goal with its cost, and the price of a stricter goal, as one line."""
+    problem, point = study.problem, study.selected
+    if point is None:
+        return f"{study.goal:g}: no method meets this error{smallest_error(study.points)}"
+    cost = f"{1e3 * point.time:.3g} ms of CPU time for {problem.duration:g} {problem.unit}"
+    finer = [p for p in study.points if p.error <= STRICTER * study.goal]
+    if not finer:
+        price = "no method is ten times more accurate"
+    elif point.evaluations is None:
+        price = f"ten times more accurate costs {cheapest(finer, study.goal).time / point.time:.2g} times"
+    else:
+        ratio = cheapest(finer, study.goal).work[0] / point.evaluations
+        price = f"ten times more accurate costs {ratio:.2g} times"
+        cost += f", {point.evaluations} evaluations"
+    return (
+        f"{study.goal:g}: {point.method} at {setting(point, problem.unit)} (error {point.error:.1e}), {cost}; {price}"
+    )
+
+
+def show_points(console: Console, problem: Problem, points: list[Point], rounding: RoundOff | None = None) -> None:
+    """Print the cheapest points of each method at a few errors, and the round-off error."""
+    console.print(f"{problem.title}, {problem.duration:g} {problem.unit}; reference: {problem.source}", highlight=False)
+    drifts = ["drift of\n" + name.replace(" ", "\n") for name in _drifts(points)]
+    heads = ("method (order)\n    step", "error", "CPU\n[ms]", "evaluations", *drifts)
+    rows = table(*heads, box=None, pad_edge=False, collapse_padding=True)
+    previous = None
+    for point in pareto_points(points, LEVELS):
+        if point.method != previous:
+            rows.add_row(f"{point.method} ({point.order})")
+        rows.add_row(
+            f"    {setting(point, problem.unit)}", f"{point.error:.1e}", f"{1e3 * point.time:.3g}",
+            "" if point.evaluations is None else str(point.evaluations),
+            *(f"{point.drift[n]:.0e}" for n in _drifts(points)),
+        )  # fmt: skip
+        previous = point.method
+    console.print(rows)
+    if rounding is not None:
+        text = (
+            f"round-off: {rounding.error:.1e}, against {rounding.steps} equal steps of {rounding.method} "
+            "in extended precision"
+        )
+        console.print(text, highlight=False)
+
+
+def _drifts(points: list[Point]) -> list[str]:
+    return list(points[0].drift) if points else []
+
+
+def show_error_sources(console: Console, parts: list[ErrorSource], cost: tuple[float, float] | None) -> None:
+    """Print the error sources of a flight, and the cost of a plant step [ns]: hovering, on the ground."""
+    console.print("Error sources of the flight, in closed loop without noise (90th percentile over the ticks):")
+    heads = ("source", "setting", "position (m)", "attitude (rad)", "largest (m)")
+    rows = table(*heads, box=SIMPLE, pad_edge=False)
+    rows.columns[1].justify = "left"
+    previous = None
+    for part in parts:
+        source = part.source if part.source != previous else ""
+        errors = (part.position, part.attitude, part.largest_position)
+        rows.add_row(source, part.label, *(f"{error:.1e}" for error in errors))
+        previous = part.source
+    console.print(rows)
+    if cost:
+        air, ground = cost
+        console.print(f"A plant step takes {air:.0f} ns hovering, {ground:.0f} ns in contact.", highlight=False)

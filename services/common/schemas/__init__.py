@@ -1,0 +1,1 @@
+"""Scene tables that several services read."""

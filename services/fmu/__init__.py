@@ -1,1 +1,0 @@
-"""FMUs as services of the lock step, each in a separate process."""

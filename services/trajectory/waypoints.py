@@ -1,0 +1,140 @@
+"""Phases through waypoints: take-off, a leg to each point, landing."""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated, Any, Literal, NamedTuple
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.geodesy import Home, geodetic_to_enu
+from lapwing.dynamics.vector import ZERO
+from lapwing.kernels import math, python_function
+from lapwing.kernels.math import dist
+from lapwing.services.trajectory.segments.segment import Finite, Positive
+
+Point = Annotated[tuple[Finite, ...], Field(strict=False, min_length=3, max_length=4)]
+Points = Annotated[tuple[Point, ...], Field(strict=False, min_length=1)]
+PEAK = 1.875  # largest speed of a minimum-jerk motion over its mean
+VERTICAL = 1.0  # [m/s] largest speed of take-off and landing
+YAW_RATE = 1.0  # [rad/s] largest rate of the heading on a leg that ends with a stop
+REST = 2.0  # [s] at the end
+SHORTEST = 1e-3  # [m] between neighbouring points
+
+
+class Waypoint(BaseModel):
+    """A waypoint as a table: a place in metres or on the Earth, and optionally a heading."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    x: Finite | None = None  # [m] displacement from the start along world x (east)
+    y: Finite | None = None  # [m] along world y (north)
+    latitude_deg: Annotated[float, Field(ge=-90.0, le=90.0)] | None = None  # [deg] with longitude_deg, instead of x, y
+    longitude_deg: Annotated[float, Field(ge=-180.0, le=180.0)] | None = None  # [deg] east
+    z: Finite  # [m] height above the ground at the start
+    yaw_deg: Finite | None = None  # [deg] heading at the point, relative to that at the start, counter-clockwise
+
+    def point(self, home: Home, start: tuple[float, float]) -> list[float]:
+        """Return x, y, z [m] and, if it is given, the yaw [rad].
+
+        Args:
+            home: origin of the world frame.
+            start: world x and y of the vehicle's start [m].
+
+        Raises:
+            ConfigError: the place is missing, or given twice.
+        """
+        pairs = [(self.x, self.y), (self.latitude_deg, self.longitude_deg)]
+        given = [pair for pair in pairs if pair != (None, None)]
+        if len(given) != 1 or None in given[0]:
+            names = ", ".join(sorted(self.model_fields_set))
+            raise ConfigError("", f"got {names}", "x and y, or latitude_deg and longitude_deg")
+        if self.x is not None and self.y is not None:
+            place = [self.x, self.y, self.z]
+        else:
+            height = home.height + self.z
+            x, y, _ = python_function(geodetic_to_enu)(home, self.latitude_deg, self.longitude_deg, height)
+            place = [x - start[0], y - start[1], self.z]
+        return place if self.yaw_deg is None else [*place, math.radians(self.yaw_deg)]
+
+
+class Route(BaseModel):
+    """Waypoints, and the manner of flight between them."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    waypoints: Points = ()  # [m] x, y, z, instead of phases; or tables: x, y or latitude_deg, longitude_deg; z; yaw_deg
+    speed: Positive = 2.0  # [m/s] largest speed between waypoints
+    turn: Literal["stop", "round"] = "stop"  # stop at each waypoint, or pass it without a stop
+    land: bool = True  # land below the last waypoint; otherwise the vehicle hovers there
+
+
+def phases(route: Route) -> list[dict[str, Any]]:
+    """Return the tables of the phases of a route.
+
+    The vehicle climbs to the height of the first point and flies straight legs to the points, at most at `speed` [m/s].
+    A fourth number of a point is its yaw [rad], which the vehicle turns to on the leg, the shorter way round.
+    It stops at each point, or with turn = "round" passes it in the mean direction of its legs, the slower the sharper
+    the turn, and leaves the straight line for it.
+
+    Raises:
+        ConfigError: a point repeats the one before; the key is relative to the table.
+    """
+    points, speed = [point[:3] for point in route.waypoints], route.speed
+    turns = _turns([point[3] if len(point) == 4 else None for point in route.waypoints])
+    climb, slow = points[0][2], min(speed, VERTICAL)
+    path = [(0.0, 0.0, climb), *points]
+    if dist(path[0], path[1]) < SHORTEST:
+        del path[0]
+    result = [_leg("take-off", {"z": climb}, PEAK * climb / slow)] if climb > 0.0 else []
+    first = len(points) - len(path) + 2
+    if first == 2 and turns[0]:  # the first point is above the start
+        result.append(_leg("turn", {"yaw": turns[0].end}, PEAK * abs(turns[0].change) / YAW_RATE))
+    for number, (a, b) in enumerate(pairwise(path), start=first):
+        if dist(a, b) < SHORTEST:
+            raise ConfigError(f"waypoints.{number - 1}", f"got {list(b)} like the point before", "another point")
+    rates = _rates(path, speed if route.turn == "round" else 0.0)
+    for number, ((a, b), (u, v)) in enumerate(zip(pairwise(path), pairwise(rates), strict=True), start=first):
+        pace = 0.5 * (dist(ZERO, u) + dist(ZERO, v))  # the mean, as the speed changes evenly between the ends
+        duration = dist(a, b) / pace if pace > 0.0 else PEAK * dist(a, b) / speed
+        ends = dict(zip("xyz", b, strict=True))
+        if turn := turns[number - 1]:
+            ends["yaw"] = turn.end
+            duration = duration if pace > 0.0 else max(duration, PEAK * abs(turn.change) / YAW_RATE)
+        result.append(_leg(f"waypoint {number}", ends, duration, u, v))
+    end = points[-1][2]
+    if route.land and end > 0.0:
+        result.append(_leg("landing", {"z": 0.0}, PEAK * end / slow))
+    return [*result, {"name": "rest" if route.land else "hover", "duration": REST}]
+
+
+class _Turn(NamedTuple):
+    end: float  # [rad] yaw at the end
+    change: float  # [rad] along the shorter way
+
+
+def _turns(yaws: Sequence[float | None]) -> list[_Turn | None]:
+    """Return the turn on the leg to each point; None where the heading stays."""
+    result: list[_Turn | None] = []
+    previous = 0.0
+    for yaw in yaws:
+        change = 0.0 if yaw is None else math.atan2(*math.sincos(yaw - previous))
+        previous += change
+        result.append(_Turn(previous, change) if change else None)
+    return result
+
+
+def _rates(path: Sequence[Point], speed: float) -> list[Point]:
+    """Return the velocity [m/s] at each point: the mean direction of its legs times the speed; rest at the ends."""
+    legs = [tuple((q - p) / dist(a, b) for p, q in zip(a, b, strict=True)) for a, b in pairwise(path)]
+    inner = [tuple(0.5 * speed * (p + q) for p, q in zip(a, b, strict=True)) for a, b in pairwise(legs)]
+    return [ZERO, *((x, y, z) for x, y, z in inner), *[ZERO] * (len(path) > 1)]
+
+
+def _leg(name: str, ends: dict[str, float], duration: float, first: Point = ZERO, last: Point = ZERO) -> dict[str, Any]:
+    rates = dict(zip("xyz", zip(first, last, strict=True), strict=True), yaw=(0.0, 0.0))
+    return {"name": name} | {
+        channel: {"kind": "through", "to": to, "duration": duration}
+        | dict(zip(("start_rate", "end_rate"), rates[channel], strict=True))
+        for channel, to in ends.items()
+    }

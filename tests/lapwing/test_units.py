@@ -1,0 +1,86 @@
+"""Values with units in scenes: converted to the unit of their key, or rejected with it."""
+
+import math
+
+import jsonschema
+import pytest
+
+from lapwing.cosim.scene import SceneError
+from lapwing.dynamics import units
+from lapwing.dynamics.effects._from_scene import validate_table
+from lapwing.file_schemas.descriptions import effect_settings
+from lapwing.file_schemas.json_schema import SCHEMAS
+from lapwing.services.scene_resolver import from_resolved, load, resolve
+from lapwing.services.trajectory.schema import Trajectory, compile_trajectory
+
+
+@pytest.mark.parametrize(
+    ("text", "unit", "value"),
+    [
+        ("30 deg", "rad", math.pi / 6.0),
+        ("0.5rad", "deg", math.degrees(0.5)),
+        ("36 km/h", "m/s", 10.0),
+        ("7in", "m", 0.1778),
+        ("250 ms", "s", 0.25),
+        ("2200 mAh", "A s", 7920.0),
+        ("-1.5e2 cm", "m", -1.5),
+    ],
+)
+def test_texts_are_numbers_in_unit(text, unit, value):
+    assert units.parse(text, unit) == pytest.approx(value, rel=1e-12)
+
+
+@pytest.mark.parametrize(("text", "unit"), [("30", "rad"), ("30 m", "rad"), ("x deg", "rad"), ("30 deg", "dB")])
+def test_other_texts_and_units_are_no_numbers(text, unit):
+    assert units.parse(text, unit) is None
+
+
+def test_table_of_scene_has_converted_values():
+    scene = load("hover", {"run.duration": "0.5 min", "environment.home.height": "1000 ft"})
+    assert scene.lookup("run.duration") == 30.0
+    assert scene.resolved["environment"]["home"]["height"] == pytest.approx(304.8)
+
+
+def test_segment_and_waypoints_have_converted_values(tmp_path):
+    turn = {"kind": "minimum_jerk", "to": "90 deg", "duration": "3 s"}
+    path = compile_trajectory(load("hover", {"trajectory.phase.1.yaw": turn})).parameters.yaw
+    assert path.coefficients[-1, 0] == pytest.approx(math.pi / 2.0)
+    own = tmp_path / "own.toml"
+    own.write_text('[run]\nduration = 20.0\n[vehicle]\nairframe = "delivery_drone"\n[effects.gravity]\n'
+                   '[effects.rotor_thrust]\n'
+                   '[autopilot]\ngains = "tuned"\nestimator = "ground_truth"\n'
+                   '[trajectory]\nwaypoints = [["100 ft", 0.0, 5.0]]\nspeed = "18 km/h"\n')  # fmt: skip
+    route = load(own)[Trajectory]
+    assert (route.waypoints[0][0], route.speed) == (pytest.approx(30.48), pytest.approx(5.0))
+
+
+def test_schema_for_editors_accepts_units_of_keys():
+    validator = jsonschema.Draft7Validator(SCHEMAS["scene"]()["properties"]["run"])
+    for value in (30.0, "30 s", "0.5 min"):
+        assert validator.is_valid({"duration": value}), value
+    for value in ("30", "30 m", "s"):
+        assert not validator.is_valid({"duration": value}), value
+
+
+def test_effect_and_sensor_have_converted_values():
+    wind = {"speed": "18 km/h", "direction_to": "90 deg", "height": 10.0, "roughness": "3 cm"}
+    camera = {"pitch_deg": "0.5 rad", "range_max": "3000 ft"}
+    scene = load("hover", {"effects.wind_boundary_layer": wind, "sensors.depth_camera": camera})
+    assert resolve(scene)
+    assert resolve(from_resolved(scene.resolved))
+    settings = validate_table(effect_settings("wind_boundary_layer"), wind)
+    assert (settings.speed, settings.roughness) == (pytest.approx(5.0), pytest.approx(0.03))
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "message"),
+    [
+        ("run.duration", "30 m", "run.duration: expected a number above 0 and at most 1e+06 [s], got '30 m'"),
+        ("run.duration", "30", "run.duration: expected a number above 0 and at most 1e+06 [s], got '30'"),
+        ("effects.wind_constant.velocity", ["3 kg", 0.0, 0.0], "effects.wind_constant.velocity.0: expected a number"),
+    ],
+)
+def test_value_with_wrong_unit_is_rejected(key, value, message):
+    with pytest.raises(SceneError) as error:
+        load("hover", {key: value})
+    assert message in str(error.value)
