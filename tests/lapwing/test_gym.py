@@ -56,7 +56,6 @@ def test_env_checker_passes_without_warning(task):
 
 
 @pytest.mark.long
-@pytest.mark.long
 @pytest.mark.parametrize("task", TASKS)
 def test_observations_stay_within_bounds_under_random_actions(task):
     environments, random = many(task, 20), np.random.default_rng(4)
@@ -74,7 +73,7 @@ def test_observations_stay_within_bounds_under_random_actions(task):
 def test_invalid_vehicle_is_lost_and_observed_within_bounds():
     environments = many("Hover", 2)
     environments.reset(seed=1)
-    environments.unwrapped.batch.restart([1], position_world=(0.0, 0.0, 5.0), omega_body=(1e4, 0.0, 0.0))
+    environments.unwrapped.batch.restart([1], position_world=(0.0, 0.0, 5.0), omega_body=(1e9, 0.0, 0.0))
     observed, reward, terminated, *_ = environments.step(np.zeros((2, 4)))
     assert (terminated.tolist(), reward[1]) == ([False, True], -10.0)
     assert environments.observation_space.contains(observed)
