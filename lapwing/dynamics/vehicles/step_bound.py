@@ -23,8 +23,14 @@ class Cause(NamedTuple):
 
 
 @always_inline
+def is_valid(motion, h):
+    """Return True if a motion is finite and its rotation in a step of h [s] needs no more than `MOST_PARTS`."""
+    return finite(motion) & (norm(motion.omega_body) * h <= LARGEST_TURN * MOST_PARTS)
+
+
+@always_inline
 def parts(p, motion, memory, h):
-    """Return the number of parts of a step of h [s], at most `MOST_PARTS`.
+    """Return the number of parts of a step of h [s], at most `MOST_PARTS`; 1 for a motion that is not valid.
 
     Args:
         p: MultirotorParameters.
@@ -32,16 +38,12 @@ def parts(p, motion, memory, h):
         memory: discrete state of the effects.
         h: step [s].
     """
+    if not is_valid(motion, h):
+        return 1  # lost; parts would only cost time
     damping = hooks.all_damping_rates(p.effects, memory, motion, p.body)
     rate = max(max(p.layout.lag_rate, hooks.all_decay_rates(p.effects, memory, p.layout)), damping)
     number = max(h * rate / FASTEST_RATE, h * norm(motion.omega_body) / LARGEST_TURN)
     return max(1, math.ceil(number)) if number < MOST_PARTS else MOST_PARTS
-
-
-@always_inline
-def is_valid(motion, h):
-    """Return True if a motion is finite and its rotation in a step of h [s] needs no more than `MOST_PARTS`."""
-    return finite(motion) & (norm(motion.omega_body) * h <= LARGEST_TURN * MOST_PARTS)
 
 
 def causes(p: Any, memory: tuple) -> list[Cause]:

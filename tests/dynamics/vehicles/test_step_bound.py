@@ -10,7 +10,7 @@ from lapwing.dynamics.integrators import rk4_renormalised
 from lapwing.dynamics.noise import stream_key
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import load_airframe
-from lapwing.dynamics.vehicles.step_bound import causes
+from lapwing.dynamics.vehicles.step_bound import MOST_PARTS, causes, parts
 
 AIRFRAME = load_airframe(Path(__file__).parents[3] / "lapwing/scenes/vehicles/delivery_drone.toml")
 DRAG = 1e5  # [N s/m]
@@ -48,3 +48,12 @@ def test_fastest_cause_is_named_first():
     assert first.name == "body_drag"
     assert first.rate == pytest.approx(DRAG / AIRFRAME.mass.total)
     assert second == ("motors", p.layout.lag_rate)
+
+
+@pytest.mark.parametrize(("rate", "expected"), [(1.0, 1), (1e3, 4), (2e6, 8_000), (1e9, 1), (np.nan, 1), (np.inf, 1)])
+def test_lost_vehicle_takes_single_steps(uncompiled, rate, expected):
+    """In a batch, one member that is not valid would cost the time of ten thousand."""
+    p = vehicle(0.0)
+    state = multirotor.initial_state(p, (0.0, 0.0, 50.0))
+    motion = state.motion._replace(omega_body=(rate, 0.0, 0.0))
+    assert parts(p, motion, state.memory, 1e-3) == expected <= MOST_PARTS
