@@ -22,8 +22,15 @@ if TYPE_CHECKING:
     from lapwing.flights.flight_events import Event
     from lapwing.flights.outcome import FlightOutcome
     from lapwing.services.common.ports import Setpoint
-    from lapwing.studies.campaign.distributions import choice, linspace, lognormal, loguniform, normal, uniform
-    from lapwing.studies.campaign.posterior import posterior
+    from lapwing.studies.campaign.distributions import (
+        choice,
+        linspace,
+        lognormal,
+        loguniform,
+        normal,
+        posterior,
+        uniform,
+    )
 
 _NAMES = {
     "lapwing.api.functions": ("campaign", "fly", "load_scene", "read_log"),
@@ -33,8 +40,15 @@ _NAMES = {
     "lapwing.api.flight": ("Flight",),
     "lapwing.services.common.ports": ("Setpoint",),
     "lapwing.api.simulator": ("Observation", "Simulator"),
-    "lapwing.studies.campaign.distributions": ("choice", "linspace", "lognormal", "loguniform", "normal", "uniform"),
-    "lapwing.studies.campaign.posterior": ("posterior",),
+    "lapwing.studies.campaign.distributions": (
+        "choice",
+        "linspace",
+        "lognormal",
+        "loguniform",
+        "normal",
+        "posterior",
+        "uniform",
+    ),
     "lapwing.flights.flight_events": ("Event",),
     "lapwing.flights.outcome": ("FlightOutcome",),
 }

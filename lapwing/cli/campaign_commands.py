@@ -179,7 +179,7 @@ def _explain(folder: Path, run: int, json: Path | None) -> None:
 
 
 def _reference(screen: "Console", campaign_plan: "Plan") -> "Reference":
-    from lapwing.runs.compile_notice import notify_on_compile
+    from lapwing.runs.observer import notify_on_compile
     from lapwing.studies.campaign.runs import first_config, reference
 
     run, config = first_config(campaign_plan)
@@ -194,7 +194,7 @@ def _distributions(vary: list[str]) -> "dict[str, Distribution]":
     result: dict[str, Distribution] = {}
     for text in vary:
         if "=" not in text and text.endswith(".toml"):
-            from lapwing.studies.campaign.posterior import posterior  # imports numba
+            from lapwing.studies.campaign.distributions import posterior  # imports numba
 
             drawn = posterior(text)
             if twice := sorted(set(drawn) & set(result)):

@@ -9,26 +9,8 @@ from typing import Annotated
 
 import typer
 
-from lapwing.cli import (  # noqa: F401 (they register themselves)
-    campaign_commands,
-    export_commands,
-    flight_commands,
-    log_commands,
-    log_playback,
-    new_command,
-    new_vehicle,
-    protocol,
-    report_commands,
-    run_command,
-    scene_commands,
-    scene_tests,
-    service_command,
-    setup_commands,
-    study_commands,
-)
 from lapwing.cli.app import GROUPS, app
-from lapwing.cli.error_exit import USER_ERROR, fail, user_errors
-from lapwing.cli.stdout_guard import check_output
+from lapwing.cli.error_exit import USER_ERROR, check_output, fail, user_errors
 
 # Raised for unknown options and missing arguments; not every version of typer exports the class.
 UsageError: type[typer.BadParameter] = typer.BadParameter.__base__  # type: ignore[assignment]

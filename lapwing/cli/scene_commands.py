@@ -130,7 +130,7 @@ def _accuracy_met(result: "FlightAccuracy", json: Path | None) -> bool:
 
 def _with_bar(config: "RunConfig", description: str, work: Callable[[Callable[[int], None]], T]) -> T:
     """Work on a run in this process, with a line that describes the run and a progress bar."""
-    from lapwing.runs.compile_notice import notify_on_compile
+    from lapwing.runs.observer import notify_on_compile
     from lapwing.runs.work_progress import WorkProgress
 
     duration = config.last_tick * config.interval

@@ -19,7 +19,7 @@ from lapwing.services.common.autopilot_parameters import Parameter
 from lapwing.services.plant import models
 from lapwing.services.scene_resolver import load, vocabulary
 from lapwing.services.sensors.fault_schedule import SLOTS, FaultTable
-from lapwing.services.sensors.registry import sensors
+from lapwing.services.sensors.schema import sensors
 from lapwing.services.trajectory.segments import KINDS
 from lapwing.services.trajectory.trajectory_compiler import CHANNELS
 from lapwing.services.trajectory.waypoints import Waypoint

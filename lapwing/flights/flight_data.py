@@ -24,7 +24,7 @@ from lapwing.flights.flight_events import (
     with_crash,
 )
 from lapwing.flights.flight_provenance import Origin
-from lapwing.flights.flight_tracking import FlightTracking
+from lapwing.flights.flight_topics import FlightTracking
 from lapwing.flights.mission import Mission, mission_of
 from lapwing.flights.outcome import LANDED, FlightOutcome, classify
 from lapwing.flights.port_columns import columns_of

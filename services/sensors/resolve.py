@@ -28,10 +28,9 @@ from lapwing.services.sensors.block import Instrument
 from lapwing.services.sensors.encoders import GpsEncoding, SonarEncoding
 from lapwing.services.sensors.gps import Gps
 from lapwing.services.sensors.imu import Imu
-from lapwing.services.sensors.registry import module_of, parameters
 from lapwing.services.sensors.rotor_vibration import Damage
 from lapwing.services.sensors.scan import ScanPose, VehiclePose
-from lapwing.services.sensors.schema import Sensors
+from lapwing.services.sensors.schema import Sensors, module_of, parameters
 from lapwing.services.sensors.sensor_inputs import OtherVehicle, Truth
 from lapwing.services.sensors.service import SensorsConfig
 

@@ -3,7 +3,7 @@
 A step packet contains the rows of the service's ports that are due at the tick, in the order of the run configuration:
 little-endian float64 without padding. A packet of several ticks (`lapwing.cosim.transport.packet_schedule`) contains,
 port by port, all rows that are due in them. A service without outputs in these ticks sends no packet. An empty packet
-is the last one.
+is the last one. `layout` describes them for programs in other languages.
 
 A log packet contains all messages of the ticks [start, stop): start and stop (int64 each), then record batches: length
 of the topic's name (uint16), number of messages and size of a payload (uint32 each), the name, the ticks (int64 each),
@@ -13,14 +13,18 @@ the payloads.
 import math
 import struct
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
+from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.config.serialise import to_json
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.cosim.diagram.topic_encoder import RecordBatch, due_ticks
+from lapwing.cosim.transport.bus_keys import ALIVE_KEY, BATCH_KEY, CONFIG_KEY, STEP_KEY, WAITING_KEY
 from lapwing.kernels.row_packing import row_width
+from lapwing.messages.message_diff import leaves
 from lapwing.messages.topics import topic_named
 
 _BATCH = struct.Struct("<HII")
@@ -140,3 +144,38 @@ def unpack_log_packet(payload: bytes) -> tuple[int, int, list[RecordBatch]]:
         return start, stop, batches
     except (struct.error, ValueError, IndexError) as error:
         raise PacketError(f"log packet of {len(payload)} bytes: {error}") from None
+
+
+def layout(config: RunConfig) -> dict[str, Any]:
+    """Return ports, periods and columns of all services as a tree for JSON.
+
+    Returns:
+        "rate" [Hz], "interval_ns", "last_tick", "order" (of the services within a tick), "keys" (the first parts of
+        their keys, by purpose), "services" (by name: "inputs", each with "port" and "delay" [ticks], and "ports" in the
+        order of a step packet, each with "name", "period" [ticks] and "columns"), and "config", the text of the run
+        configuration.
+    """
+    return {
+        "rate": config.rate,
+        "interval_ns": config.interval_ns,
+        "last_tick": config.last_tick,
+        "order": config.order,
+        "keys": {
+            "step": STEP_KEY,
+            "batch": BATCH_KEY,
+            "alive": ALIVE_KEY,
+            "waiting": WAITING_KEY,
+            "config": CONFIG_KEY,
+        },
+        "services": {
+            name: {
+                "inputs": [{"port": i.port, "delay": i.delay} for i in service.inputs],
+                "ports": [
+                    {"name": p.name, "period": p.period, "columns": [column for column, _ in leaves(p.example)]}
+                    for p in service.ports
+                ],
+            }
+            for name, service in config.services.items()
+        },
+        "config": to_json(config),
+    }

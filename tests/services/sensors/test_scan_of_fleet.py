@@ -15,7 +15,7 @@ from lapwing.dynamics.vehicles.visible_body import visible_body
 from lapwing.flights.flight_data import FlightData
 from lapwing.messages.topics import LASER_SCAN
 from lapwing.services.common.schemas.vehicle_schema import airframe
-from lapwing.services.mavlink.telemetry.obstacle_distance import obstacle_distance
+from lapwing.services.mavlink.telemetry.external_sensors import obstacle_distance
 from lapwing.services.scene_resolver import load, parse, reseed, resolve
 
 SCENE = """
