@@ -36,8 +36,9 @@ from lapwing.services.common.schemas.vehicle_schema import Effects, airframe
 from lapwing.services.scene_resolver import load
 from lapwing.studies.campaign.campaign_config import campaign_config
 from lapwing.studies.simulate import fly_with_ports
+from lapwing.studies.tune.bandwidths import Bandwidths
 from lapwing.studies.tune.corners import Corner, with_gains, with_vehicle
-from lapwing.studies.tune.design import Bandwidths, design, gain_set
+from lapwing.studies.tune.design import design, gain_set
 from lapwing.studies.tune.linearise import hover
 
 OWN = "hexa5"  # written by `lapwing new vehicle`, with designed gains

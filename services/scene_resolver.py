@@ -15,7 +15,7 @@ from lapwing.cosim import scene as scenes
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram import multi_vehicle
 from lapwing.cosim.scene import Overrides, Scene, SceneError, Vocabulary
-from lapwing.services.common import user_code
+from lapwing.services.common import user_modules
 from lapwing.services.common.firmware.schema import FIRMWARES
 from lapwing.services.common.schemas import communication_schema as exchange
 from lapwing.services.common.schemas import environment_schema, mesh_schema, run_schema, success_criteria
@@ -54,7 +54,7 @@ def _configurations() -> list[ModuleType]:
 @cache
 def vocabulary() -> Vocabulary:
     """Return all possible scene tables: shared ones, those of services, and those of plant models."""
-    shared = [run_schema, success_criteria, exchange, environment_schema, vehicle, user_code, mesh_schema]
+    shared = [run_schema, success_criteria, exchange, environment_schema, vehicle, user_modules, mesh_schema]
     tables = [*shared, *_configurations(), *map(models.get, models.names())]
     return Vocabulary.of(tables, models.check)
 

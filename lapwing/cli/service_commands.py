@@ -1,4 +1,4 @@
-"""`lapwing service` and `lapwing protocol`: services that are started separately."""
+"""`lapwing service`, `protocol` and `certificates`: services that are started separately."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,7 +21,7 @@ from lapwing.cli.options import (
     parse_speed,
     with_options,
 )
-from lapwing.cli.output_paths import check_distinct, claim, claim_plot
+from lapwing.cli.output_paths import check_distinct, check_not_dash, claim, claim_plot
 from lapwing.cli.preflight import with_solver_selected
 from lapwing.cli.run_options import check_endpoints
 from lapwing.cosim.complete_file import write_text
@@ -146,3 +146,22 @@ def _show(name: str, service: dict[str, Any]) -> None:
         typer.echo(f"  output {port['name']}, {every}: {len(port['columns'])} columns")
         for offset, column in enumerate(port["columns"]):
             typer.echo(f"    {8 * offset:5d}  {column}")
+
+
+@app.command()
+def certificates(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="folder to create")],
+    days: Annotated[int, typer.Option(metavar="N", min=1, max=3650, help="validity [days]")] = 365,
+) -> None:
+    """Create TLS certificates for runs on several hosts.
+
+    Writes a certificate for each service and a read-only one for viewers to FOLDER.
+    """
+    from lapwing.cosim.access.certificates import make
+    from lapwing.cosim.access.zenoh_access import VIEWER
+    from lapwing.services.security import names
+
+    check_not_dash(folder)
+    holders = [*names(), VIEWER]
+    make(folder, holders, days)
+    typer.echo(f"{folder}: certificates of {', '.join(holders)}; copy to each host only its own; do not commit them")

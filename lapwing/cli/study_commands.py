@@ -14,7 +14,7 @@ from lapwing.cli.app import app
 from lapwing.cli.error_exit import fail
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import check_distinct, claim, claim_named, claim_plot
-from lapwing.studies.tune.design import Bandwidths
+from lapwing.studies.tune.bandwidths import Bandwidths
 
 if TYPE_CHECKING:
     from rich.console import Console

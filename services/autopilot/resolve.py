@@ -16,7 +16,7 @@ from lapwing.services.autopilot.land_detector import Thresholds
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.autopilot.schema import ESTIMATORS, Autopilot, distance_sensor
 from lapwing.services.autopilot.service_config import AutopilotConfig, CustomCode
-from lapwing.services.common import autopilot_parameters, ports, user_code
+from lapwing.services.common import autopilot_parameters, ports, user_modules
 from lapwing.services.common.firmware.schema import flown_by_firmware
 from lapwing.services.common.ports import AutopilotStatus, EstimateCovariance, MotorCommand, Setpoint, StateEstimate
 from lapwing.services.common.schemas.communication_schema import Communication, Rates, ticks
@@ -93,7 +93,7 @@ def _custom(scene: Scene, key: str, rate: Callable[..., float]) -> CustomCode:
     """Return the user code that the key names, after a trial step."""
     config, vehicle = scene[Autopilot], vehicle_model(known_airframe(scene), scene[Communication].interval)
     name, options = getattr(config, key), dict(getattr(config, f"{key}_options"))
-    code_rate = rate(name, user_code.texts(scene), vehicle, options)
+    code_rate = rate(name, user_modules.texts(scene), vehicle, options)
     return CustomCode(name, options, ticks(scene, code_rate, f"autopilot.{key}"))
 
 

@@ -13,7 +13,7 @@ from lapwing.services.autopilot.gains import FOLDER, GainSet
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.autopilot.parameter_file import parse
 from lapwing.services.common import autopilot_parameters as parameters
-from lapwing.services.common import ports, user_code
+from lapwing.services.common import ports, user_code, user_modules
 from lapwing.services.common.firmware.schema import FIRMWARES, FirmwareKeys, is_foreign
 from lapwing.services.common.schemas.environment_schema import environment
 from lapwing.services.common.schemas.vehicle_schema import Effects, airframe
@@ -84,7 +84,7 @@ class Autopilot(FirmwareKeys):
                 if code not in ESTIMATORS:
                     raise ConfigError.unknown(where, "estimator", code, (*ESTIMATORS, "module:Name"))
             elif isinstance(code, str) and (module := user_code.split_reference(where, code)[0]) != user_code.MEMORY:
-                user_code.embed(tree, files, where, module)
+                user_modules.embed(tree, files, where, module)
         if isinstance(file := unvalidated_value(tree, cls.TABLE, "parameters"), str):
             path = files.folder / file
             text = files.text("autopilot.parameters", "autopilot.parameters", path)

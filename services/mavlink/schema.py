@@ -7,7 +7,7 @@ from pydantic import Field
 from lapwing.cosim.scene import Files, Scene, SceneTable
 from lapwing.cosim.scene.files import unvalidated_value
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.services.common import user_code
+from lapwing.services.common import user_code, user_modules
 
 
 class Mavlink(SceneTable):
@@ -23,7 +23,7 @@ class Mavlink(SceneTable):
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
         """Store the user module."""
         if isinstance(module := unvalidated_value(tree, cls.TABLE, "module"), str):
-            user_code.embed(tree, files, "mavlink.module", module)
+            user_modules.embed(tree, files, "mavlink.module", module)
 
     @classmethod
     def defaults_of(cls, i: int) -> dict[str, Any]:
@@ -36,7 +36,7 @@ class Mavlink(SceneTable):
             return
         from lapwing.services.mavlink.telemetry.message_stream import STREAMS  # imports pymavlink
 
-        user_code.load_module("mavlink.module", self.module, user_code.texts(scene))
+        user_code.load_module("mavlink.module", self.module, user_modules.texts(scene))
         if not any(stream.build.__module__ == self.module for stream in STREAMS.values()):
             expected = '@stream("NAME", rate) with a message of the MAVLink dialect'
             raise ConfigError("mavlink.module", f"{self.module} declares no message", expected)

@@ -1,4 +1,4 @@
-"""The `[sensors]` table of a scene, with a table for each sensor of the vehicle."""
+"""The `[sensors]` table of a scene with a table for each sensor, the sensors of this folder, and their parameters."""
 
 import importlib
 import math
@@ -18,7 +18,7 @@ from lapwing.services.common.schemas.communication_schema import Communication, 
 from lapwing.services.common.schemas.named_tables import NamedTables
 from lapwing.services.sensors import fault_schedule
 
-NO_SENSORS = ("schema", "registry", "service")  # modules of the folder that import this one
+NO_SENSORS = ("schema", "service")  # they import the sensors
 
 
 @cache

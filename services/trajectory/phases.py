@@ -11,7 +11,7 @@ from lapwing.cosim.config.user_module import FAULTS, blame
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.validation import fault
-from lapwing.services.common import user_code
+from lapwing.services.common import user_code, user_modules
 from lapwing.services.trajectory.polynomial_piece import Piece
 from lapwing.services.trajectory.segments import KINDS, choose
 from lapwing.services.trajectory.segments.segment import Positive, Segment
@@ -124,7 +124,7 @@ def load(scene: Scene, segments: Iterator[tuple[str, Segment]]) -> None:
         scene: scene with the modules' texts.
         segments: pairs of scene key and segment.
     """
-    texts = user_code.texts(scene)
+    texts = user_modules.texts(scene)
     for key, segment in segments:
         if isinstance(segment, UserSegment):
             user_code.load_module(f"{key}.module", segment.module, texts)

@@ -45,7 +45,7 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.geodesy import Home
 from lapwing.dynamics.terrain import Level, surface
 from lapwing.dynamics.validation import validated
-from lapwing.services.common import user_code
+from lapwing.services.common import user_modules
 from lapwing.services.common.schemas.environment_schema import EnvironmentTable, environment
 from lapwing.services.common.schemas.vehicle_schema import Vehicle, start_place
 from lapwing.services.trajectory import phases, waypoints
@@ -103,7 +103,7 @@ class Trajectory(Route, Phases, SceneTable):
                         continue
                     key = f"trajectory.phase.{i}.{channel}" + (f".{k}" if several else "")
                     if isinstance(module := segment.get("module"), str):
-                        user_code.embed(tree, files, f"{key}.module", module)
+                        user_modules.embed(tree, files, f"{key}.module", module)
                     elif isinstance(file := segment.get("file"), str):
                         path = files.folder / file
                         segment["points"] = parse_table(files.text(f"{key}.points", f"{key}.file", path), path)

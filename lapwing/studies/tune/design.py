@@ -2,24 +2,14 @@
 
 import math
 from collections.abc import Callable
-from typing import NamedTuple
 
 import numpy as np
 
 from lapwing.services.autopilot.controller_parameters import Airframe, build, lift, moments
 from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.autopilot.margins import FREQUENCIES, LOOP_WORDS, margins, open_loops, stable
+from lapwing.studies.tune.bandwidths import Bandwidths
 from lapwing.studies.tune.linearise import Hover
-
-
-class Bandwidths(NamedTuple):
-    """Bandwidth of each loop [rad/s]: derivative gain times the plant's gain, approximately the crossover."""
-
-    altitude: float = 13.0
-    yaw: float = 17.4
-    attitude: float = 26.0
-    position: float = 4.9
-
 
 PHASE_MARGIN, GAIN_MARGIN = 45.0, 6.0  # [deg], [dB] required margins
 CORNERS = (0.8 / 1.2, 1.2 / 0.8)  # thrust over mass or inertia, each with an error of 20 % in the worse direction

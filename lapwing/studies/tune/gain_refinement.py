@@ -13,8 +13,9 @@ from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.autopilot.margins import open_loops
 from lapwing.services.scene_resolver import reseed
 from lapwing.studies.campaign.campaign_config import campaign_config
+from lapwing.studies.tune.bandwidths import Bandwidths
 from lapwing.studies.tune.corners import metrics_of, with_gains
-from lapwing.studies.tune.design import DELAY, Bandwidths, assumed_airframe, gain_set, shortfalls
+from lapwing.studies.tune.design import DELAY, assumed_airframe, gain_set, shortfalls
 from lapwing.studies.tune.linearise import Hover
 
 Figures = dict[str, Any]  # metrics by name, see `lapwing.flights.metrics`

@@ -20,7 +20,8 @@ from lapwing.services.common.schemas.run_schema import follows_trajectory
 from lapwing.services.common.schemas.vehicle_schema import Vehicle
 from lapwing.studies.campaign.campaign_config import campaign_config
 from lapwing.studies.tune import corners, gain_refinement
-from lapwing.studies.tune.design import DELAY, Bandwidths, assumed_airframe, design, gain_set, shortfalls
+from lapwing.studies.tune.bandwidths import Bandwidths
+from lapwing.studies.tune.design import DELAY, assumed_airframe, design, gain_set, shortfalls
 from lapwing.studies.tune.identify import Identification, identify
 from lapwing.studies.tune.linearise import Hover, hover
 

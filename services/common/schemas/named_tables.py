@@ -7,7 +7,7 @@ from pydantic import ConfigDict
 
 from lapwing.cosim.scene import Files, Scene, SceneTable
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.services.common import user_code
+from lapwing.services.common import user_code, user_modules
 
 
 class NamedTables(SceneTable):
@@ -26,7 +26,7 @@ class NamedTables(SceneTable):
         entries = tree.get(cls.TABLE, {})
         for name, entry in entries.items() if isinstance(entries, dict) else ():
             if isinstance(entry, dict) and isinstance(module := entry.get("module"), str):
-                user_code.embed(tree, files, f"{cls.TABLE}.{name}.module", module)
+                user_modules.embed(tree, files, f"{cls.TABLE}.{name}.module", module)
 
     def check(self, scene: Scene) -> None:
         """Raise ConfigError unless every entry is a table."""
@@ -36,7 +36,7 @@ class NamedTables(SceneTable):
 
     def load(self, scene: Scene) -> None:
         """Import the user modules. Raise ConfigError if one cannot be imported."""
-        texts = user_code.texts(scene)
+        texts = user_modules.texts(scene)
         for name, table in self.tables.items():
             if "module" in table:
                 key = f"{self.TABLE}.{name}.module"

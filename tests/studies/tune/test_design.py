@@ -8,15 +8,8 @@ from lapwing.services.autopilot.gains import load
 from lapwing.services.autopilot.margins import margins, open_loops, stable
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.scene_resolver import load as load_scene
-from lapwing.studies.tune.design import (
-    GAIN_MARGIN,
-    PHASE_MARGIN,
-    Bandwidths,
-    assumed_airframe,
-    design,
-    gain_set,
-    shortfalls,
-)
+from lapwing.studies.tune.bandwidths import Bandwidths
+from lapwing.studies.tune.design import GAIN_MARGIN, PHASE_MARGIN, assumed_airframe, design, gain_set, shortfalls
 from lapwing.studies.tune.linearise import hover
 
 SCENE = load_scene(Path(__file__).parents[3] / "lapwing/scenes" / "hover.toml")

@@ -12,7 +12,7 @@ from lapwing.services.autopilot.gains import load
 from lapwing.services.autopilot.stability_check import unstable_loops
 from lapwing.services.scene_resolver import load as load_scene
 from lapwing.studies.simulate import fly
-from lapwing.studies.tune.design import Bandwidths
+from lapwing.studies.tune.bandwidths import Bandwidths
 from lapwing.studies.tune.gain_refinement import rmse
 from lapwing.studies.tune.procedure import tune, write
 from lapwing.views.studies.study_result import show, write_report
