@@ -237,7 +237,7 @@ def _workers(screen: "Console", cluster: str | None, number: int) -> "Workers":
     from lapwing.studies import workers
 
     if cluster is not None:
-        from lapwing.studies.campaign.cluster import dask
+        from lapwing.studies.workers import dask
 
         return dask(cluster, lambda line: screen.print(line, soft_wrap=True))
     return workers.run_here if number <= 1 else workers.processes(number)

@@ -22,7 +22,7 @@ from lapwing.cosim.transport.packet_exchange import (
     PacketSender,
     packet_receivers,
 )
-from lapwing.cosim.transport.packet_schedule import ticks_per_packet
+from lapwing.cosim.transport.packets import ticks_per_packet
 
 
 def run_lockstep(

@@ -23,8 +23,15 @@ from lapwing.studies.validation.prediction_metrics import (
     pool,
     ratios,
 )
-from lapwing.studies.validation.start_states import USUAL_TRIM, StartStates, TrimMemory, start_states
-from lapwing.studies.validation.unmeasured_motion import trim_memory, unmeasured_motion, with_made_up_motion
+from lapwing.studies.validation.start_states import (
+    USUAL_TRIM,
+    StartStates,
+    TrimMemory,
+    start_states,
+    trim_memory,
+    unmeasured_motion,
+    with_made_up_motion,
+)
 from lapwing.studies.validation.windows import Errors, compare, predict, thrust_ratio, window_starts, without_window
 
 USABLE = "use flights that leave the ground"
