@@ -123,7 +123,7 @@ def campaign(
             return
         digest = folder.finish(csv)
 
-        from lapwing.file_schemas.key_units import key_units
+        from lapwing.file_schemas.json_schema import key_units
         from lapwing.studies.campaign.results import Results
         from lapwing.views.studies.campaign_result import result
         from lapwing.views.studies.study_result import show, write_json, write_report

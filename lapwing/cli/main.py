@@ -77,7 +77,7 @@ def main() -> None:
         _check_working_directory()
         _check_encoding()
         _check_open_files()
-        from lapwing.cosim.processes.gc_tuning import relax_gc
+        from lapwing.cosim.processes import relax_gc
         from lapwing.services.common import foreign_code
 
         relax_gc()
