@@ -111,7 +111,7 @@ def test_single_vehicle_sees_no_vehicles(tmp_path):
     alone = alone.replace('name = "seeing"', '[vehicle]\nname = "seeing"')
     sensors = resolve(parse(tmp_path / "alone.toml", alone)).services["sensors"]
     assert [i.port for i in sensors.inputs] == ["truth"]
-    assert all(instrument.others == () for instrument in sensors.parameters.instruments)
+    assert all(instrument.others == () for instrument in sensors.parameters)
 
 
 @pytest.mark.long
