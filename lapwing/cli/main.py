@@ -9,6 +9,21 @@ from typing import Annotated
 
 import typer
 
+from lapwing.cli import (  # noqa: F401 (they register themselves)
+    campaign_commands,
+    export_commands,
+    flight_commands,
+    log_commands,
+    log_playback,
+    new_command,
+    new_vehicle,
+    report_commands,
+    run_command,
+    scene_commands,
+    scene_tests,
+    service_commands,
+    study_commands,
+)
 from lapwing.cli.app import GROUPS, app
 from lapwing.cli.error_exit import USER_ERROR, check_output, fail, user_errors
 

@@ -32,14 +32,6 @@ from lapwing.services.sensors.scan import ScanPose, VehiclePose
 from lapwing.services.sensors.schema import Sensors, module_of, parameters
 from lapwing.services.sensors.sensor_inputs import OtherVehicle, Truth
 
-READINGS = {
-    ports.IMU: ports.ImuReading(),
-    ports.MAGNETOMETER: ports.MagnetometerReading(),
-    ports.GPS: ports.GpsReading(),
-    ports.BAROMETER: ports.BarometerReading(),
-    ports.SONAR: ports.DistanceReading(),
-}
-
 
 def resolve(scene: Scene) -> ServiceConfig | None:
     """Return the configuration of the scene's sensors. Return None without any."""
@@ -55,7 +47,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
             p = _with_terrain(scene, p)
         key = stream_key(scene[Run].seed, scene[Vehicle].name, name)
         instruments.append(Instrument(p, key, gravity(scene), environment(scene)))
-        reading = READINGS[name] if name in READINGS else _reading(name, table, p)
+        reading = trial_reading(name, table, p) if "module" in table else module_of(name, table).READING
         outputs.append(Port(name, reading, ticks(scene, p.rate, f"sensors.{name}.rate")))
         for unit in ports.IMUS[1 : p.instances] if name == ports.IMU else ():
             if unit in tables:
@@ -124,10 +116,6 @@ def reseed(settings: ServiceConfig, seed: int, vehicle: str) -> ServiceConfig:
         for instrument, port in zip(settings.parameters, settings.ports, strict=True)
     )
     return settings._replace(parameters=instruments)
-
-
-def _reading(name: str, table: Mapping[str, Any], p: Any) -> Any:
-    return trial_reading(name, table, p) if "module" in table else module_of(name, table).READING
 
 
 def trial_reading(name: str, table: Mapping[str, Any], p: Any) -> Any:

@@ -84,7 +84,8 @@ def read(path: Path, site: Site = ORIGIN) -> Plan:
 def parse(path: Path, text: str, site: Site = ORIGIN) -> Plan:
     """Return the plan with this content. See `read` for errors."""
     try:
-        return _plan(_items(text.removeprefix("\ufeff")), site)
+        text = text.removeprefix("\ufeff")
+        return _plan(read_rows(text) if text.startswith(HEADER) else read_json(json.loads(text)), site)
     except KeyError as error:
         raise ValueError(f"{path}: not a plan: key {error} is missing; {EXPECTED}") from None
     except (TypeError, IndexError, AttributeError, OverflowError):
@@ -95,10 +96,6 @@ def parse(path: Path, text: str, site: Site = ORIGIN) -> Plan:
         raise ValueError(f"{path}: neither JSON (.plan) nor {HEADER} {VERSION} (.waypoints): {error}") from None
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-
-
-def _items(text: str) -> PlanItems:
-    return read_rows(text) if text.startswith(HEADER) else read_json(json.loads(text))
 
 
 def _plan(items: PlanItems, site: Site) -> Plan:
