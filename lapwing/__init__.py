@@ -22,15 +22,8 @@ if TYPE_CHECKING:
     from lapwing.flights.flight_events import Event
     from lapwing.flights.outcome import FlightOutcome
     from lapwing.services.common.ports import Setpoint
-    from lapwing.studies.campaign.distributions import (
-        choice,
-        linspace,
-        lognormal,
-        loguniform,
-        normal,
-        posterior,
-        uniform,
-    )
+    from lapwing.studies.campaign.distributions import choice, linspace, lognormal, loguniform, normal, uniform
+    from lapwing.studies.campaign.posterior import posterior
 
 _NAMES = {
     "lapwing.api.functions": ("campaign", "fly", "load_scene", "read_log"),
@@ -40,15 +33,8 @@ _NAMES = {
     "lapwing.api.flight": ("Flight",),
     "lapwing.services.common.ports": ("Setpoint",),
     "lapwing.api.simulator": ("Observation", "Simulator"),
-    "lapwing.studies.campaign.distributions": (
-        "choice",
-        "linspace",
-        "lognormal",
-        "loguniform",
-        "normal",
-        "posterior",
-        "uniform",
-    ),
+    "lapwing.studies.campaign.distributions": ("choice", "linspace", "lognormal", "loguniform", "normal", "uniform"),
+    "lapwing.studies.campaign.posterior": ("posterior",),
     "lapwing.flights.flight_events": ("Event",),
     "lapwing.flights.outcome": ("FlightOutcome",),
 }

@@ -194,7 +194,7 @@ def _distributions(vary: list[str]) -> "dict[str, Distribution]":
     result: dict[str, Distribution] = {}
     for text in vary:
         if "=" not in text and text.endswith(".toml"):
-            from lapwing.studies.campaign.distributions import posterior  # imports numba
+            from lapwing.studies.campaign.posterior import posterior  # imports numba
 
             drawn = posterior(text)
             if twice := sorted(set(drawn) & set(result)):

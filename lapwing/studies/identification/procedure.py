@@ -17,7 +17,7 @@ from lapwing.dynamics.config_error import did_you_mean
 from lapwing.flights.log_import.recording import Recording
 from lapwing.services.common.schemas.vehicle_schema import VehicleAirframe, airframe
 from lapwing.services.scene_resolver import load_one
-from lapwing.studies.campaign import distributions
+from lapwing.studies.campaign import posterior
 from lapwing.studies.campaign.distributions import lognormal, normal
 from lapwing.studies.identification.flight_parameters import KEYS, apply_flight_parameters, is_flight_parameter
 from lapwing.studies.identification.output_error import FIELDS, HORIZONS, Fit, OutputError
@@ -170,7 +170,7 @@ def joint_distribution(fit: Fit) -> dict[str, Any]:
     kinds = {fit.keys[k]: lognormal.__name__ if fit.start[k] > 0.0 else normal.__name__ for k in own}
     errors = fit.standard_errors[own]
     covariance = fit.correlations[np.ix_(own, own)] * np.outer(errors, errors)
-    return {distributions.TABLE: distributions.table(kinds, fit.values[own], covariance)}
+    return {posterior.TABLE: posterior.table(kinds, fit.values[own], covariance)}
 
 
 def start_value(scene: Scene, key: str) -> float:

@@ -6,8 +6,9 @@ import pytest
 from lapwing.cosim.scene.toml_text import dump
 from lapwing.services.common.schemas.vehicle_schema import VehicleAirframe
 from lapwing.services.scene_resolver import load_one
-from lapwing.studies.campaign.distributions import normal, parse, posterior, table
+from lapwing.studies.campaign.distributions import normal, parse
 from lapwing.studies.campaign.plan import plan
+from lapwing.studies.campaign.posterior import posterior, table
 
 SCENE = "crazyflie_21"
 KEYS = {
