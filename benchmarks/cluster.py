@@ -10,8 +10,8 @@ import time
 
 from benchmarks._command import command_line
 from lapwing.flights.metrics import METRICS
-from lapwing.studies.campaign.cluster import dask
 from lapwing.studies.campaign.folder import MAX_SHARD_SIZE as RUNS
+from lapwing.studies.workers import dask
 
 
 def rows(shard):

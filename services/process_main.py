@@ -157,7 +157,7 @@ def _operator_commands(process: Any) -> dict[str, Any]:
 
 def main(name: str) -> None:
     """Run the participant that standard input specifies; `name` is imported before the specification is read."""
-    from lapwing.cosim.processes.gc_tuning import relax_gc
+    from lapwing.cosim.processes import relax_gc
     from lapwing.services.common import foreign_code
 
     relax_gc()

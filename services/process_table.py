@@ -14,8 +14,7 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import Service
 from lapwing.cosim.diagram.multi_vehicle import members, merge_services
 from lapwing.cosim.transport.bus_keys import ENCODER
-from lapwing.fmi.importer.replaced_ports import rewire
-from lapwing.fmi.importer.service_config import fmus_of, replaced_ports
+from lapwing.fmi.importer.service_config import fmus_of, replaced_ports, rewire
 from lapwing.services.common.foreign_code import FMU_SUFFIX
 
 

@@ -17,7 +17,7 @@ from lapwing.dynamics.lie.quaternion import from_roll_pitch_yaw, rotation_matrix
 from lapwing.services.common.schemas.communication_schema import Communication
 from lapwing.services.common.schemas.vehicle_schema import airframe
 from lapwing.services.scene_resolver import load
-from lapwing.services.sensors.registry import parameters
+from lapwing.services.sensors.schema import parameters
 
 RED, GREEN, BLUE, GREY, DARK = "#D55E00", "#009E73", "#0072B2", "#999999", "#333333"
 EAST = np.array([0.80, -0.34])  # of the picture's plane, for a unit along each axis of the world

@@ -14,8 +14,7 @@ from lapwing.cosim.log import LogWriter
 from lapwing.cosim.log.log_sequencer import Recording
 from lapwing.cosim.output_lock import write_errors
 from lapwing.flights.flight_data import FlightData
-from lapwing.flights.flight_topics import topic_of
-from lapwing.flights.flight_tracking import AXES
+from lapwing.flights.flight_topics import AXES, topic_of
 from lapwing.flights.log_events import event_messages
 from lapwing.messages.topics import EVENTS
 from lapwing.views.report import write

@@ -10,7 +10,7 @@ from typing import Any
 from lapwing.api.flight import Flight
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.scene import Overrides, Scene, SceneError
-from lapwing.runs.compile_notice import notify_on_compile
+from lapwing.runs.observer import notify_on_compile
 from lapwing.runs.solver import with_solver
 from lapwing.runs.work_progress import WorkProgress
 from lapwing.services import scene_resolver

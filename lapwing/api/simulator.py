@@ -12,7 +12,7 @@ from lapwing.cosim.diagram.block_diagram import BlockDiagram, ExternalBlock, Ser
 from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
 from lapwing.cosim.scene import KeyOrigin, Overrides, Scene, SceneError
 from lapwing.kernels.row_packing import pack_row, row_width
-from lapwing.runs.compile_notice import notify_on_compile
+from lapwing.runs.observer import notify_on_compile
 from lapwing.runs.solver import with_solver
 from lapwing.runs.work_progress import WorkProgress
 from lapwing.services.autopilot.block import NO_TRAJECTORY, ORDER, ControllerInput

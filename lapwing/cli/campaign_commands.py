@@ -123,7 +123,7 @@ def campaign(
             return
         digest = folder.finish(csv)
 
-        from lapwing.file_schemas.key_units import key_units
+        from lapwing.file_schemas.json_schema import key_units
         from lapwing.studies.campaign.results import Results
         from lapwing.views.studies.campaign_result import result
         from lapwing.views.studies.study_result import show, write_json, write_report
@@ -179,7 +179,7 @@ def _explain(folder: Path, run: int, json: Path | None) -> None:
 
 
 def _reference(screen: "Console", campaign_plan: "Plan") -> "Reference":
-    from lapwing.runs.compile_notice import notify_on_compile
+    from lapwing.runs.observer import notify_on_compile
     from lapwing.studies.campaign.runs import first_config, reference
 
     run, config = first_config(campaign_plan)
@@ -237,7 +237,7 @@ def _workers(screen: "Console", cluster: str | None, number: int) -> "Workers":
     from lapwing.studies import workers
 
     if cluster is not None:
-        from lapwing.studies.campaign.cluster import dask
+        from lapwing.studies.workers import dask
 
         return dask(cluster, lambda line: screen.print(line, soft_wrap=True))
     return workers.run_here if number <= 1 else workers.processes(number)

@@ -67,7 +67,7 @@ def verify(
     with LogReader(log) as read:
         recorded, computed, metadata = read.metadata.get("digest"), read.digest(), read.metadata
     if explain:
-        from lapwing.flights.logs.reproduction import expectation, facts
+        from lapwing.flights.logs.log_comparison import expectation, facts
 
         for fact in facts(metadata):
             note = "same" if fact.recorded == fact.here else f"here {fact.here}"
@@ -86,7 +86,7 @@ def recover(
     out: Annotated[Path | None, typer.Option(metavar="FILE", help="recovered log [FILE_recovered.mcap]")] = None,
 ) -> None:
     """Write the intact messages of a damaged log to a new log."""
-    from lapwing.cosim.log.recover import recover as save
+    from lapwing.cosim.log.log_editing import recover as save
 
     target = out or log.with_name(f"{log.stem}_recovered.mcap")
     check_distinct({"FILE": log, "--out": target})

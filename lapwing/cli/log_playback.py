@@ -1,5 +1,7 @@
 """Playback of logs: publication with the recorded timing, and resimulation from the recorded inputs."""
 
+import os
+import select
 import time
 from collections.abc import Callable
 from contextlib import ExitStack
@@ -10,13 +12,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from lapwing.cli.app import app
-from lapwing.cli.endpoint_checks import check_published
 from lapwing.cli.error_exit import fail
 from lapwing.cli.options import KeyPrefix, LinkOptions, LogFile, Speed, parse_speed, with_options
 from lapwing.cli.output_paths import check_log
+from lapwing.cli.run_options import check_published
 
 if TYPE_CHECKING:
     from lapwing.services.mavlink.link_server import LinkServer
+
 
 ENDPOINT = "tcp/127.0.0.1:7447"
 ENDPOINT_ROS2 = "tcp/127.0.0.1:7448"  # the Zenoh router of a ROS 2 domain has port 7447
@@ -69,10 +72,8 @@ def replay(options: ReplayOptions) -> None:
 
     Keys in a terminal: space pauses and resumes, a full stop plays the messages of the next time, q quits.
     """
-    from lapwing.cli.keyboard import Keyboard
     from lapwing.cosim.processes.interrupt import Stop
-    from lapwing.services.replay.playback_clock import Pace
-    from lapwing.services.replay.playback_schedule import Cut
+    from lapwing.services.replay.playback_timing import Cut, Pace
     from lapwing.services.replay.player import play
 
     log = options.log
@@ -120,8 +121,7 @@ def _link_servers(options: ReplayOptions, speed: float | None, stack: ExitStack)
     from lapwing.cosim.diagram.multi_vehicle import members
     from lapwing.cosim.log import LogReader
     from lapwing.runs.resimulate import recorded_config
-    from lapwing.services.mavlink.link_options import Options
-    from lapwing.services.mavlink.link_server import LinkServer
+    from lapwing.services.mavlink.link_server import LinkServer, Options
     from lapwing.services.mavlink.links import for_vehicle_index
     from lapwing.services.mavlink.signing import read_key
     from lapwing.services.mavlink.vehicle_description import VehicleDescription
@@ -185,3 +185,44 @@ def resimulate(
         if recorded != computed:
             fail(f"{log}: digests differ: recorded {recorded}, resimulated {computed}", 1)
         typer.echo(f"{log}: resimulated, digest {computed} is identical")
+
+
+class Keyboard:
+    """Context manager that reads single keys of a terminal without echo; other inputs have no keys."""
+
+    def __init__(self, descriptor: int = 0):
+        """Read keys of a file descriptor, by default standard input."""
+        self._descriptor = descriptor
+        self._before: Any = None
+        self.available = os.isatty(descriptor) and _in_foreground(descriptor)
+
+    def keys(self) -> str:
+        """Return the keys that were typed since the last call."""
+        if not self.available or not select.select([self._descriptor], [], [], 0.0)[0]:
+            return ""
+        typed = os.read(self._descriptor, 64)
+        self.available = bool(typed)  # empty if the terminal was closed
+        return typed.decode(errors="replace")
+
+    def __enter__(self) -> "Keyboard":
+        if self.available:
+            import termios
+            import tty
+
+            self._before = termios.tcgetattr(self._descriptor)
+            tty.setcbreak(self._descriptor)
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        if self._before is not None:
+            import termios
+
+            termios.tcsetattr(self._descriptor, termios.TCSADRAIN, self._before)
+
+
+def _in_foreground(descriptor: int) -> bool:
+    """Return True if this process owns the terminal: a background job would be stopped when it reads from it."""
+    try:
+        return os.tcgetpgrp(descriptor) == os.getpgrp()
+    except OSError:  # not the terminal that controls this process
+        return True

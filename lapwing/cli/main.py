@@ -17,18 +17,15 @@ from lapwing.cli import (  # noqa: F401 (they register themselves)
     log_playback,
     new_command,
     new_vehicle,
-    protocol,
     report_commands,
     run_command,
     scene_commands,
     scene_tests,
-    service_command,
-    setup_commands,
+    service_commands,
     study_commands,
 )
 from lapwing.cli.app import GROUPS, app
-from lapwing.cli.error_exit import USER_ERROR, fail, user_errors
-from lapwing.cli.stdout_guard import check_output
+from lapwing.cli.error_exit import USER_ERROR, check_output, fail, user_errors
 
 # Raised for unknown options and missing arguments; not every version of typer exports the class.
 UsageError: type[typer.BadParameter] = typer.BadParameter.__base__  # type: ignore[assignment]
@@ -95,7 +92,7 @@ def main() -> None:
         _check_working_directory()
         _check_encoding()
         _check_open_files()
-        from lapwing.cosim.processes.gc_tuning import relax_gc
+        from lapwing.cosim.processes import relax_gc
         from lapwing.services.common import foreign_code
 
         relax_gc()

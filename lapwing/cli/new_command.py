@@ -63,7 +63,7 @@ def write_module(kind: str, name: str, folder: Path) -> list[Path]:
     """
     from lapwing.cosim.config.user_module import installed_module
     from lapwing.dynamics import effects
-    from lapwing.services.sensors import registry
+    from lapwing.services.sensors import schema
     from lapwing.services.trajectory.segments import KINDS
 
     cls = effects.class_name(name)
@@ -73,7 +73,7 @@ def write_module(kind: str, name: str, folder: Path) -> list[Path]:
     for path in paths:
         if path.exists():
             raise ValueError(f"{path}: already exists; choose another name")
-    if name in {*effects.names(), *registry.sensors(), *KINDS} or installed_module(name):
+    if name in {*effects.names(), *schema.sensors(), *KINDS} or installed_module(name):
         raise ValueError(f"NAME {name}: an effect, sensor, segment or module has this name; choose another")
     for path, text in zip(paths, templates(kind, name), strict=True):
         path.write_text(text, encoding="utf-8")

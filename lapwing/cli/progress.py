@@ -10,7 +10,7 @@ from rich.progress import BarColumn, Progress, ProgressColumn, Task, TextColumn
 from rich.text import Text
 
 from lapwing.messages import PoseStamped, Status
-from lapwing.runs.compile_notice import Compilation
+from lapwing.runs.observer import Compilation
 from lapwing.runs.work_progress import TimeLeft
 
 LINE_PERIOD = 2.0  # [s] of wall time between two lines if the output is not a terminal

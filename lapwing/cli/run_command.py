@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import typer
 
-from lapwing.cli import plan_options
+from lapwing.cli import run_options
 from lapwing.cli.app import app
 from lapwing.cli.options import absolute, check_pace, parse_speed, with_options
 from lapwing.cli.output_paths import check_distinct, check_log, claim, claim_report, remove_on_failure, reserve_log
@@ -100,7 +100,7 @@ def _load(options: RunOptions) -> "Scene":
     if options.firmware_schedule is not None:
         overrides.append(f"autopilot.schedule={options.firmware_schedule}")
     if options.plan:
-        overrides += plan_options.overrides(options.plan, options.scene, overrides)
+        overrides += run_options.plan_overrides(options.plan, options.scene, overrides)
     elif options.mavlink:
         overrides += ["autopilot.accept_commands=true"]
     if options.run_ is None or options.campaign is None:
@@ -133,7 +133,7 @@ def _spec(options: RunOptions, scene: "Scene") -> "ProcessSpec":
     from lapwing.services.process_table import foreign_firmware, required_processes
     from lapwing.services.scene_resolver import resolve
 
-    config = resolve(scene, plan_options.commands(options.plan or [], scene, _print_note))
+    config = resolve(scene, run_options.plan_commands(options.plan or [], scene, _print_note))
     if options.mavlink and (firmware := foreign_firmware(config)):
         message = f"--mavlink: {firmware} flies the vehicle and has its own MAVLink or MSP links"
         raise ValueError(f"{message}; connect the ground station to the firmware")

@@ -1,13 +1,53 @@
 """Options of `lapwing run`, validated before any file is read or process started."""
 
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from lapwing.cosim.scene import Scene
+
+from collections.abc import Iterable
+from dataclasses import dataclass
 from typing import Annotated
 
 import typer
 
-from lapwing.cli.endpoint_checks import check_endpoints, check_external
 from lapwing.cli.options import KeyPrefix, Keys, LinkOptions, Overrides, PlanFiles, SceneFile, parse_speed
+
+
+def check_endpoints(option: str, endpoints: Iterable[str], keys: Path | None, insecure: bool) -> None:
+    """Raise ValueError for a Zenoh endpoint without authentication, unless `insecure`."""
+    for endpoint in endpoints:
+        kind = endpoint.partition("/")[0]
+        if kind == "tls" and not keys:
+            raise ValueError(
+                f"{option} {endpoint}: needs certificates; use --keys FOLDER (made by `lapwing certificates FOLDER`)"
+            )
+        if kind not in ("tls", "unixsock-stream") and not insecure:
+            expected = "use tls/HOST:PORT with --keys FOLDER, or --insecure"
+            raise ValueError(f"{option} {endpoint}: endpoint is not authenticated; {expected}")
+
+
+def check_published(option: str, endpoint: str, insecure: bool) -> None:
+    """Raise ValueError for a Zenoh endpoint that other machines can reach without authentication."""
+    from lapwing.runs.distributed_run import check_endpoint
+    from lapwing.services.common.address import is_loopback
+
+    check_endpoint(option, endpoint)
+    kind, _, address = endpoint.partition("/")
+    if kind != "unixsock-stream" and not is_loopback(address.rpartition(":")[0].strip("[]")) and not insecure:
+        expected = "use a loopback address, e.g. tcp/127.0.0.1:7447, or --insecure"
+        raise ValueError(f"{option} {endpoint}: endpoint is not authenticated; {expected}")
+
+
+def check_external(texts: Iterable[str], insecure: bool) -> None:
+    """Raise ValueError for an external service at an endpoint that other users could occupy, unless `insecure`."""
+    for text in texts:
+        if "=unixsock-stream/" not in text and not insecure:
+            expected = "use unixsock-stream/PATH in a folder of your own, or --insecure"
+            raise ValueError(f"--external {text}: endpoint is not authenticated; {expected}")
+
 
 MULTI_PROCESS, SINGLE_PROCESS = "multi-process", "single-process"
 ALTERNATIVES = {  # options of a run that starts its own processes, and what to use in other runs
@@ -125,3 +165,65 @@ class RunOptions(LinkOptions):
         """Return the mode; by default one process if a firmware flies, because that is several times faster."""
         processes = self._for_processes or self.listen is not None or self.endpoints is not None
         return self.mode or (SINGLE_PROCESS if firmware and not processes else MULTI_PROCESS)
+
+
+def plan_overrides(plans: list[str], scene: Path, set_: list[str]) -> list[str]:
+    """Return the overrides for vehicles with plans: they accept commands and do not follow the trajectory.
+
+    Raises:
+        ValueError: a plan without the name of a vehicle, or with an unknown name.
+        SceneError: the scene is invalid.
+    """
+    from lapwing.services.common.plans.plan_file import OPERATED
+    from lapwing.services.scene_resolver import load
+
+    if not plans:
+        return []
+    base = load(scene, set_)
+    if not base.vehicles:
+        plan_files(plans, base)
+        return OPERATED
+    names = [vehicle.lookup("vehicle.name") for vehicle in base.vehicles]
+    return [f"vehicle.{names.index(name)}.{text}" for name in plan_files(plans, base) for text in OPERATED]
+
+
+def plan_commands(
+    plans: list[str], loaded: "Scene", report: Callable[[str], None] = lambda line: None
+) -> Mapping[str, tuple[Any, ...]]:
+    """Return the commands of each vehicle that flies a plan, by name. See `plan_overrides` for errors.
+
+    Args:
+        plans: values of --plan.
+        loaded: the scene.
+        report: called with a line for each kind of items that are skipped, or flown in another way.
+    """
+    from lapwing.services.common.plans.plan_file import read, site_of
+
+    scenes = {scene.lookup("vehicle.name"): scene for scene in loaded.each_vehicle}
+    result = {}
+    for name, path in plan_files(plans, loaded).items():
+        plan = read(path, site_of(scenes[name]))
+        for note in plan.notes:
+            report(f"{path}: {note}")
+        result[name] = plan.commands
+    return result
+
+
+def plan_files(plans: list[str], loaded: "Scene") -> dict[str, Path]:
+    """Return the plan of each vehicle that flies one, by name. See `plan_overrides` for errors."""
+    if not loaded.vehicles:
+        if len(plans) > 1:
+            raise ValueError(f"--plan {plans[1]}: expected one plan, the scene has one vehicle")
+        return {loaded.lookup("vehicle.name"): Path(path) for path in plans}
+    names = [vehicle.lookup("vehicle.name") for vehicle in loaded.vehicles]
+    result: dict[str, Path] = {}
+    for text in plans:
+        name, equals, path = text.partition("=")
+        if not equals or name not in names or name in result:
+            expected = f"NAME=FILE, a plan for each of {', '.join(names)} that flies one"
+            fault = "the scene has several vehicles"
+            if equals:
+                fault = f"{name} has a plan already" if name in result else f"the scene has no vehicle {name}"
+            raise ValueError(f"--plan {text}: {fault}; expected {expected}")
+        result[name] = Path(path)
+    return result

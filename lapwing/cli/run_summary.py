@@ -124,7 +124,7 @@ def _ending(console: Console, result: dict[str, Any]) -> None:
     if result["wall_time_s"] is not None:
         console.print(
             f"{result['sim_time_s']:.1f} s simulated in {result['wall_time_s']:.1f} s: "
-            f"real-time factor {result['real_time_factor']:.1f} ({result['mode']})",
+            f"real-time factor {result['real_time_factor']:.1f} ({result['mode']})"
         )
     for line in result["firmware"]:
         console.print(line, soft_wrap=True)

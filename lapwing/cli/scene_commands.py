@@ -1,4 +1,4 @@
-"""Scenes listed, checked and precompiled; autopilot parameters."""
+"""Scenes listed, checked and precompiled; autopilot parameters; schemas for editors."""
 
 from collections.abc import Callable
 from pathlib import Path
@@ -10,6 +10,8 @@ from lapwing.cli.app import app
 from lapwing.cli.options import Overrides
 from lapwing.cli.output_paths import check_distinct, claim
 from lapwing.cli.preflight import check_gains, warn_of_round_off, warn_of_split_steps, with_solver_selected
+from lapwing.cosim.complete_file import write_text
+from lapwing.dynamics.config_error import ConfigError
 
 if TYPE_CHECKING:
     from lapwing.cosim.config.run_config import RunConfig
@@ -130,7 +132,7 @@ def _accuracy_met(result: "FlightAccuracy", json: Path | None) -> bool:
 
 def _with_bar(config: "RunConfig", description: str, work: Callable[[Callable[[int], None]], T]) -> T:
     """Work on a run in this process, with a line that describes the run and a progress bar."""
-    from lapwing.runs.compile_notice import notify_on_compile
+    from lapwing.runs.observer import notify_on_compile
     from lapwing.runs.work_progress import WorkProgress
 
     duration = config.last_tick * config.interval
@@ -216,3 +218,23 @@ def parameters(
         parameter_file.write(save, known.values(), values)
     for p in known.values():
         typer.echo(f"{p.name:<16} {values[p.name]:<12.6g} {p.unit:<6} {p.least:g} to {p.most:g}: {p.meaning}")
+
+
+@app.command()
+def schema(
+    kind: Annotated[str, typer.Argument(metavar="KIND", help="kind of file: scene, airframe or gains")] = "scene",
+    out: Annotated[Path | None, typer.Option(metavar="FILE", help="output file [standard output]")] = None,
+) -> None:
+    """Write a JSON schema with which editors check TOML files."""
+    import json
+
+    from lapwing.file_schemas.json_schema import SCHEMAS
+
+    if kind not in SCHEMAS:
+        raise ConfigError.unknown("KIND", "kind of file", kind, SCHEMAS)
+    text = json.dumps(SCHEMAS[kind](), indent=1) + "\n"
+    if out is None:
+        typer.echo(text, nl=False)
+    else:
+        claim(out)
+        write_text(out, text)

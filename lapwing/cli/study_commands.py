@@ -214,7 +214,7 @@ def tune(
     Each loop gets the given bandwidth, with margins of 45 degrees and 6 dB at hover.
     """
     from lapwing.cli.progress import step_progress
-    from lapwing.runs.compile_notice import notify_on_compile
+    from lapwing.runs.observer import notify_on_compile
     from lapwing.services.scene_resolver import load, resolve
     from lapwing.studies.tune import gain_refinement, procedure
     from lapwing.views.studies import tune_result

@@ -1,7 +1,7 @@
-"""JSON schemas of the TOML files that users write: scenes, airframes, gain sets."""
+"""JSON schemas of the TOML files that users write (scenes, airframes, gain sets), and the units of their keys."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from types import ModuleType
 from typing import Any
 
@@ -11,7 +11,7 @@ from lapwing.dynamics import effects, integrators
 from lapwing.dynamics.units import UNITS
 from lapwing.dynamics.vehicles.airframe import Airframe
 from lapwing.file_schemas import descriptions
-from lapwing.file_schemas.annotations import Schema, closed_table, required_keys, table_schema
+from lapwing.file_schemas.annotations import Schema, closed_table, dereference, required_keys, table_schema
 from lapwing.services.autopilot import gains
 from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.common import autopilot_parameters
@@ -19,7 +19,7 @@ from lapwing.services.common.autopilot_parameters import Parameter
 from lapwing.services.plant import models
 from lapwing.services.scene_resolver import load, vocabulary
 from lapwing.services.sensors.fault_schedule import SLOTS, FaultTable
-from lapwing.services.sensors.registry import sensors
+from lapwing.services.sensors.schema import sensors
 from lapwing.services.trajectory.segments import KINDS
 from lapwing.services.trajectory.trajectory_compiler import CHANNELS
 from lapwing.services.trajectory.waypoints import Waypoint
@@ -210,3 +210,34 @@ def _optional(schema: Any) -> Any:
     if isinstance(schema, dict):
         return {key: _optional(value) for key, value in schema.items() if key != "required"}
     return schema
+
+
+UNIT = re.compile(r"\[([^\]]+)\]")
+FILES = ("airframe", "gains")  # files that a scene names; the name is the first part of their keys
+
+
+def key_units(keys: Iterable[str]) -> dict[str, str]:
+    """Return the unit of each dotted key that has one: {"vehicle.mass": "kg"}."""
+    schemas = {name: SCHEMAS[name]() for name in ("scene", *FILES)}
+    units = {}
+    for key in keys:
+        first, _, rest = key.partition(".")
+        name, path = (first, rest) if first in FILES else ("scene", key)
+        for node in _nodes(schemas[name], schemas[name], path.split(".")):
+            if (unit := UNIT.match(node.get("description", ""))) and "," not in unit[1]:
+                units[key] = unit[1]
+                break
+    return units
+
+
+def _nodes(whole: dict[str, Any], node: dict[str, Any], path: list[str]) -> Iterator[dict[str, Any]]:
+    """Yield the schemas at the end of a path, through all alternatives."""
+    node = dereference(whole, node)
+    if not path:
+        yield node
+    elif path[0] in node.get("properties", {}):
+        yield from _nodes(whole, node["properties"][path[0]], path[1:])
+    elif path[0].isdigit() and isinstance(node.get("items"), dict):
+        yield from _nodes(whole, node["items"] | {"description": node.get("description", "")}, path[1:])
+    for other in (*node.get("anyOf", ()), *node.get("oneOf", ()), *node.get("allOf", ())):
+        yield from _nodes(whole, other, path)

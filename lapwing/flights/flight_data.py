@@ -14,17 +14,9 @@ from lapwing.cosim.log import LogReader
 from lapwing.flights import tracking
 from lapwing.flights.accident import with_causes
 from lapwing.flights.contacts import Neighbours, Touch, contacts
-from lapwing.flights.flight_events import (
-    IMU_SELECTION,
-    Event,
-    events,
-    imu_failures,
-    in_order,
-    slack,
-    with_crash,
-)
+from lapwing.flights.flight_events import IMU_SELECTION, Event, events, imu_failures, in_order, slack, with_crash
 from lapwing.flights.flight_provenance import Origin
-from lapwing.flights.flight_tracking import FlightTracking
+from lapwing.flights.flight_topics import FlightTracking
 from lapwing.flights.mission import Mission, mission_of
 from lapwing.flights.outcome import LANDED, FlightOutcome, classify
 from lapwing.flights.port_columns import columns_of

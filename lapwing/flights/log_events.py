@@ -3,7 +3,7 @@
 from collections.abc import Iterable
 from pathlib import Path
 
-from lapwing.cosim.log.append import append
+from lapwing.cosim.log.log_editing import append
 from lapwing.flights.flight_data import FlightData
 from lapwing.flights.flight_events import Event
 from lapwing.messages import Log, stamp

@@ -16,8 +16,7 @@ from lapwing.cosim.processes.shared_core import CoreClaim, claim_any
 from lapwing.cosim.run_errors import RunFailed
 from lapwing.cosim.transport.bus_keys import check_key_prefix
 from lapwing.messages.topics import POSE, STATUS
-from lapwing.runs.compile_notice import Compilation
-from lapwing.runs.observer import Elapsed, Observer
+from lapwing.runs.observer import Compilation, Elapsed, Observer
 from lapwing.services import process_table
 from lapwing.services.process_main import ProcessSpec, write_spec
 

@@ -10,7 +10,7 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.executors.single_process import KEPT_TICKS
 from lapwing.flights import metrics
-from lapwing.runs.compile_notice import Compilation, notify_on_compile
+from lapwing.runs.observer import Compilation, notify_on_compile
 from lapwing.services.process_table import create_all, foreign_firmware
 
 

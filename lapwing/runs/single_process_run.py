@@ -18,8 +18,7 @@ from lapwing.cosim.processes.interrupt import Interrupted, Stop
 from lapwing.cosim.processes.watchdog import Watchdog
 from lapwing.cosim.run_errors import DivergedError, LockStepError
 from lapwing.messages.topics import POSE, STATUS
-from lapwing.runs.compile_notice import notify_on_compile
-from lapwing.runs.observer import Elapsed, Observer, Silent
+from lapwing.runs.observer import Elapsed, Observer, Silent, notify_on_compile
 from lapwing.services.process_table import Operator, create_all
 
 

@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from typing import Any, Protocol
 
-from lapwing.runs.compile_notice import Compilation
+from lapwing.runs.observer import Compilation
 
 DELAY = 2.0  # [s] of work before a bar appears
 PERIOD = 0.25  # [s] between two updates of the bar

@@ -1,12 +1,11 @@
 """Messages sent to all endpoints on a change: mode, mission item, events, texts."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from lapwing.services.common.mavlink.dialect import id_of, mavlink
 from lapwing.services.common.status_texts import ROUTINE, TAKEN_OVER
 from lapwing.services.mavlink.events import Definition, new_detectors
-from lapwing.services.mavlink.statustext import statustext
 from lapwing.services.mavlink.telemetry import streams
 from lapwing.services.mavlink.vehicle_cache import VehicleCache
 
@@ -80,3 +79,14 @@ class Announcements:
         number = id_of(name)
         for message in streams()[number].messages(self._vehicle) if number is not None else ():
             self._broadcast(message)
+
+
+TEXT_LENGTH = 50  # [bytes] of one STATUSTEXT
+
+
+def statustext(severity: int, text: str, number: int = 1) -> Iterator[Any]:
+    """Yield the messages of a text; `number` (not 0) identifies the pieces of a long one."""
+    data = text.encode()
+    text_id = number if len(data) > TEXT_LENGTH else 0
+    for piece, start in enumerate(range(0, len(data), TEXT_LENGTH)):
+        yield mavlink.MAVLink_statustext_message(severity, data[start : start + TEXT_LENGTH], text_id, piece)

@@ -4,14 +4,26 @@ import selectors
 import time
 from collections.abc import Callable, Sequence
 from itertools import pairwise
-from typing import Any
+from pathlib import Path
+from typing import Any, NamedTuple
 
 from lapwing.messages import OperatorInput, header
 from lapwing.messages.topics import ESTIMATE, TOPICS, Topic
 from lapwing.services.mavlink.adapter import Adapter
-from lapwing.services.mavlink.link_options import Options
 from lapwing.services.mavlink.links import Link, open_link
 from lapwing.services.mavlink.vehicle_description import VehicleDescription
+
+
+class Options(NamedTuple):
+    """Options of the links of a vehicle."""
+
+    urls: tuple[str, ...]
+    key: bytes | None = None  # signs outgoing messages; messages without its signature are rejected
+    insecure: bool = False  # True to accept commands from other machines without a key
+    log: Path | None = None  # log that endpoints may download
+    time_stamps: Path | None = None  # file that keeps the time stamps of signed frames
+    speed: float | None = 1.0  # simulated seconds per second; None: as fast as possible
+
 
 MAX_STEPS = 200_000  # recorded steps
 

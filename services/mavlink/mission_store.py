@@ -10,11 +10,11 @@ from lapwing.services.common.mavlink.mission_export import to_mavlink
 from lapwing.services.common.plans.converter import convert, notes
 from lapwing.services.common.plans.item_converters import MAX_ITEMS
 from lapwing.services.common.plans.plan_item import PlanItem, RefusedItemError
+from lapwing.services.mavlink.announcements import statustext
 from lapwing.services.mavlink.clock import Clock
 from lapwing.services.mavlink.command_queue import CommandQueue
 from lapwing.services.mavlink.endpoint import Endpoint
 from lapwing.services.mavlink.mission_upload import Repeat, Upload
-from lapwing.services.mavlink.statustext import statustext
 
 
 def plan_items(messages: Sequence[Any], home_first: bool) -> list[PlanItem]:

@@ -23,8 +23,7 @@ from lapwing.cosim.transport.packets import unpack_log_packet
 from lapwing.messages.topics import COMMAND_ACKS, ESTIMATE, OPERATOR, STATUS, template_topic
 from lapwing.services.common.operator_inbox import OPERATOR_KEY
 from lapwing.services.mavlink.adapter import EMPTY_SIZES
-from lapwing.services.mavlink.link_options import Options
-from lapwing.services.mavlink.link_server import LinkServer
+from lapwing.services.mavlink.link_server import LinkServer, Options
 from lapwing.services.mavlink.links import for_vehicle_index
 from lapwing.services.mavlink.signing import TIME_STAMPS, read_key, state_folder
 

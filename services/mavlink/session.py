@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from lapwing.services.common.mavlink.dialect import mavlink
+from lapwing.services.mavlink.announcements import statustext
 from lapwing.services.mavlink.clock import Clock, Instant
 from lapwing.services.mavlink.command_queue import CommandQueue, OnAcknowledgement
 from lapwing.services.mavlink.component_metadata import files
@@ -15,7 +16,6 @@ from lapwing.services.mavlink.file_server import FileServer
 from lapwing.services.mavlink.mission_store import MissionStore
 from lapwing.services.mavlink.parameter_store import ParameterStore
 from lapwing.services.mavlink.setpoint_keeper import SetpointKeeper
-from lapwing.services.mavlink.statustext import statustext
 from lapwing.services.mavlink.telemetry import streams
 from lapwing.services.mavlink.telemetry.message_stream import Builder, as_list
 from lapwing.services.mavlink.vehicle_cache import VehicleCache

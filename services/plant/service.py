@@ -15,7 +15,7 @@ from lapwing.dynamics.vehicles import multirotor_euler, multirotor_multibody
 from lapwing.dynamics.vehicles.propeller_failures import Failure
 from lapwing.kernels.cell import Cell, read
 from lapwing.services.common import ports
-from lapwing.services.plant.blocks import system_outputs  # noqa: F401 (registers output functions)
+from lapwing.services.plant.blocks import uncontrolled  # noqa: F401 (registers output functions)
 from lapwing.services.plant.blocks.failing_multirotor import FailingMultirotorPlant
 from lapwing.services.plant.blocks.interaction import Interaction
 from lapwing.services.plant.blocks.multirotor import MultirotorPlantState

@@ -6,9 +6,9 @@ from typing import Any
 
 from lapwing.cosim.config.provenance import ENDED, WAITED, attachments, failure, metadata
 from lapwing.cosim.diagram.topic_encoder import RecordBatch, split_at
-from lapwing.cosim.executors.deadlines import Lateness, lateness, metadata_entries
 from lapwing.cosim.executors.log_backpressure import LogProgressPublisher
 from lapwing.cosim.executors.participant import Participant, Stopped
+from lapwing.cosim.executors.realtime import Lateness, lateness, metadata_entries
 from lapwing.cosim.log import LogWriter
 from lapwing.cosim.log.log_sequencer import Recording
 from lapwing.cosim.processes.run_monitor import MONITOR

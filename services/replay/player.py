@@ -8,8 +8,7 @@ from pathlib import Path
 from lapwing.cosim.log import LogReader, LogWriter
 from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.cosim.transport.bus_keys import ALIVE_KEY, HEARD_KEY
-from lapwing.services.replay.playback_clock import Pace
-from lapwing.services.replay.playback_schedule import Cut, schedule
+from lapwing.services.replay.playback_timing import Cut, Pace, schedule
 
 SUBSCRIBER_TIMEOUT = 1.0  # [s] for the first subscriber to appear
 CONFIRMATION_TIMEOUT = 60.0  # [s] for subscribers to confirm the end

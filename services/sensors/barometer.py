@@ -63,6 +63,9 @@ class BarometerState(NamedTuple):
     warm_up: float  # [Pa] remaining warm-up error
 
 
+READING = BarometerReading()
+
+
 def blank() -> BarometerState:
     """Return a placeholder state, replaced at the first tick."""
     return BarometerState(0.0, 0.0, ZERO, BLANK, 0.0)

@@ -1,8 +1,8 @@
 """Topic encoders of the sensors. Lost readings are published by the convention of each message type, never omitted."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -41,30 +41,18 @@ UNKNOWN = -1.0  # first element of the covariance of a missing measurement
 PORTS = (ports.IMU, ports.MAGNETOMETER, ports.GPS, ports.BAROMETER, ports.SONAR)
 
 
-class SonarEncoding(NamedTuple):
-    """Constants of a sonar's messages."""
-
-    field_of_view: float  # [rad]
-    range_min: float  # [m]
-    range_max: float  # [m]
-
-
-class GpsEncoding(NamedTuple):
-    """Constants of a satellite receiver's messages."""
-
-    fix: int = NavSatStatus.STATUS_FIX  # NavSatStatus of its fixes
-    detailed: bool = False  # kind of fix, satellites and dilution of precision are modelled
-
-
-def topic_encoders(config: RunConfig, sonar: SonarEncoding | None, gps: GpsEncoding) -> list[TopicEncoder]:
-    """Return the encoders of the vehicle's sensors in `PORTS`."""
+def topic_encoders(config: RunConfig, sensors: Mapping[str, Any]) -> list[TopicEncoder]:
+    """Return the encoders of the vehicle's sensors in `PORTS`; `sensors` has the parameters of each by name."""
     frame, port_of = config.vehicle, config.ports
+    gps, sonar = sensors.get(ports.GPS), sensors.get(ports.SONAR)
+    fix = gps.fix_status if gps else NavSatStatus.STATUS_FIX
+    detailed = gps is not None and (gps.constellation is not None or gps.rtk is not None)
     known: list[tuple[Any, str, Callable, Any]] = [
         (topic.IMU, ports.IMU, _imu, Imu(header(0, frame), orientation_covariance=(UNKNOWN,) + (0.0,) * 8)),
         (topic.MAG, ports.MAGNETOMETER, _magnetometer, MagneticField(header(0, frame))),
-        (topic.GPS, ports.GPS, partial(_gps, gps.fix), _gps_sample(frame)),
+        (topic.GPS, ports.GPS, partial(_gps, fix), _gps_sample(frame)),
         (topic.GPS_VELOCITY, ports.GPS, _gps_velocity, TwistWithCovarianceStamped(header(0, "world"))),
-        *([(topic.GPS_DETAILS, ports.GPS, _gps_details, _details_sample(frame))] if gps.detailed else []),
+        *([(topic.GPS_DETAILS, ports.GPS, _gps_details, _details_sample(frame))] if detailed else []),
         (topic.BARO, ports.BAROMETER, pressure_columns, FluidPressure(header(0, frame))),
         (topic.SONAR, ports.SONAR, _sonar, _sonar_sample(frame, sonar)),
     ]
@@ -183,8 +171,10 @@ def _gps_velocity(r: GpsReading, time_ns: np.ndarray) -> Fields:
     }
 
 
-def _sonar_sample(frame: str, sonar: SonarEncoding | None) -> Any:
-    view, least, most = sonar or (0.0, 0.0, 0.0)
+def _sonar_sample(frame: str, sonar: Any) -> Any:
+    view, least, most = 0.0, 0.0, 0.0
+    if sonar is not None:
+        view, least, most = math.radians(2.0 * sonar.half_beam_deg), sonar.range_min, sonar.range_max
     return Range(header(0, frame), radiation_type=Range.ULTRASOUND, field_of_view=view, min_range=least, max_range=most)
 
 

@@ -78,6 +78,9 @@ class GpsState(NamedTuple):
     samples: int  # since the start
 
 
+READING = GpsReading()
+
+
 def blank() -> GpsState:
     """Return a placeholder state, replaced at the first tick."""
     return GpsState(ZERO, IDENTITY, BLANK, BLANK, NO_ERRORS, RtkState(), 0)

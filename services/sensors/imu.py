@@ -78,6 +78,9 @@ def check(p: Imu) -> None:
             raise error.with_prefix(name) from None
 
 
+READING = ImuReading()
+
+
 def blank() -> ImuState:
     """Return a placeholder state, replaced at the first tick."""
     return ImuState(BLANK_TRIAD, BLANK_TRIAD, 0.0, 0.0, NO_ROTATION, ZERO, AT_REST, ZERO)

@@ -46,6 +46,9 @@ class MagnetometerState(NamedTuple):
     line: Line
 
 
+READING = MagnetometerReading()
+
+
 def blank() -> MagnetometerState:
     """Return a placeholder state, replaced at the first tick."""
     return MagnetometerState((0.0,) * 9, ZERO, ZERO, BLANK)

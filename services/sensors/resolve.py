@@ -25,23 +25,12 @@ from lapwing.services.common.schemas.environment_schema import environment
 from lapwing.services.common.schemas.run_schema import Run
 from lapwing.services.common.schemas.vehicle_schema import Vehicle, VehicleAirframe, airframe, gravity
 from lapwing.services.sensors.block import Instrument
-from lapwing.services.sensors.encoders import GpsEncoding, SonarEncoding
 from lapwing.services.sensors.gps import Gps
 from lapwing.services.sensors.imu import Imu
-from lapwing.services.sensors.registry import module_of, parameters
 from lapwing.services.sensors.rotor_vibration import Damage
 from lapwing.services.sensors.scan import ScanPose, VehiclePose
-from lapwing.services.sensors.schema import Sensors
+from lapwing.services.sensors.schema import Sensors, module_of, parameters
 from lapwing.services.sensors.sensor_inputs import OtherVehicle, Truth
-from lapwing.services.sensors.service import SensorsConfig
-
-READINGS = {
-    ports.IMU: ports.ImuReading(),
-    ports.MAGNETOMETER: ports.MagnetometerReading(),
-    ports.GPS: ports.GpsReading(),
-    ports.BAROMETER: ports.BarometerReading(),
-    ports.SONAR: ports.DistanceReading(),
-}
 
 
 def resolve(scene: Scene) -> ServiceConfig | None:
@@ -50,27 +39,23 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     if not tables:
         return None
     instruments, outputs = [], []
-    sonar, gps = None, GpsEncoding()
     for name, table in sorted(tables.items()):
         p = parameters(name, table, scene[Communication].interval)
         if name == ports.IMU:
             p = _with_damage(scene, p)
         elif name == ports.GPS:
             p = _with_terrain(scene, p)
-            gps = GpsEncoding(p.fix_status, p.constellation is not None or p.rtk is not None)
         key = stream_key(scene[Run].seed, scene[Vehicle].name, name)
         instruments.append(Instrument(p, key, gravity(scene), environment(scene)))
-        reading = READINGS[name] if name in READINGS else _reading(name, table, p)
+        reading = trial_reading(name, table, p) if "module" in table else module_of(name, table).READING
         outputs.append(Port(name, reading, ticks(scene, p.rate, f"sensors.{name}.rate")))
-        if name == ports.SONAR:
-            sonar = SonarEncoding(math.radians(2.0 * p.half_beam_deg), p.range_min, p.range_max)
         for unit in ports.IMUS[1 : p.instances] if name == ports.IMU else ():
             if unit in tables:
                 raise ConfigError(f"sensors.{unit}", "is the name of a redundant unit of sensors.imu", "another name")
             key = stream_key(scene[Run].seed, scene[Vehicle].name, unit)
             instruments.append(Instrument(p._replace(faults=None), key, gravity(scene), environment(scene)))
             outputs.append(outputs[-1]._replace(name=unit))
-    return ServiceConfig(SensorsConfig(tuple(instruments), sonar, gps), (InputPort(ports.TRUTH),), tuple(outputs))
+    return ServiceConfig(tuple(instruments), (InputPort(ports.TRUTH),), tuple(outputs))
 
 
 def _with_damage(scene: Scene, p: Imu) -> Imu:
@@ -106,18 +91,18 @@ def fleet(
 
 
 def _with_others(settings: ServiceConfig, bodies: Mapping[str, VisibleBody]) -> ServiceConfig:
-    config: SensorsConfig = settings.parameters
-    seeing = [_sees_vehicles(sys.modules[type(i.sensor).__module__]) for i in config.instruments]
+    before: tuple[Instrument, ...] = settings.parameters
+    seeing = [_sees_vehicles(sys.modules[type(i.sensor).__module__]) for i in before]
     if not bodies or not any(seeing):
         return settings
     instruments, outputs = [], []
-    for sees, instrument, port in zip(seeing, config.instruments, settings.ports, strict=True):
+    for sees, instrument, port in zip(seeing, before, settings.ports, strict=True):
         instruments.append(instrument._replace(others=tuple(bodies.values())) if sees else instrument)
         if isinstance(port.example, ScanPose):
             port = port._replace(example=port.example._replace(others=(VehiclePose(),) * len(bodies)))
         outputs.append(port)
     inputs = (*settings.inputs, *(InputPort(neighbour_port(other, ports.TRUTH)) for other in bodies))
-    return ServiceConfig(config._replace(instruments=tuple(instruments)), inputs, tuple(outputs))
+    return ServiceConfig(tuple(instruments), inputs, tuple(outputs))
 
 
 def _sees_vehicles(module: ModuleType) -> bool:
@@ -126,16 +111,11 @@ def _sees_vehicles(module: ModuleType) -> bool:
 
 def reseed(settings: ServiceConfig, seed: int, vehicle: str) -> ServiceConfig:
     """Return the instruments with another seed."""
-    config: SensorsConfig = settings.parameters
     instruments = tuple(
         instrument._replace(key=stream_key(seed, vehicle, port.name))
-        for instrument, port in zip(config.instruments, settings.ports, strict=True)
+        for instrument, port in zip(settings.parameters, settings.ports, strict=True)
     )
-    return settings._replace(parameters=config._replace(instruments=instruments))
-
-
-def _reading(name: str, table: Mapping[str, Any], p: Any) -> Any:
-    return trial_reading(name, table, p) if "module" in table else module_of(name, table).READING
+    return settings._replace(parameters=instruments)
 
 
 def trial_reading(name: str, table: Mapping[str, Any], p: Any) -> Any:

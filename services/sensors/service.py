@@ -1,7 +1,6 @@
 """Sensor service: computes the readings of each instrument from the true state."""
 
 import sys
-from typing import NamedTuple
 
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import Service
@@ -11,43 +10,24 @@ from lapwing.kernels.cell import Cell
 from lapwing.services.common import ports
 from lapwing.services.common.encoders import reading_encoder
 from lapwing.services.sensors.block import Instrument
-from lapwing.services.sensors.encoders import PORTS, GpsEncoding, SonarEncoding, topic_encoders
+from lapwing.services.sensors.encoders import PORTS, topic_encoders
 
 NAME = "sensors"
 
 
-class SensorsConfig(NamedTuple):
-    """Resolved configuration of the service."""
-
-    instruments: tuple[Instrument, ...]  # in the order of their ports
-    sonar: SonarEncoding | None  # None without a sonar
-    gps: GpsEncoding
-
-
 def create(config: RunConfig) -> Service:
-    """Return the sensors of a run."""
+    """Return the sensors of a run, whose parameters are its instruments in the order of their ports."""
     settings = config.services[NAME]
-    s: SensorsConfig = settings.parameters
-    parts = [
-        Block(f"{NAME}.{port.name}", p, Cell(_blank(p)), settings.inputs[: 1 + len(p.others)], (port,), port.period)
-        for p, port in zip(s.instruments, settings.ports, strict=True)
-    ]
-    return Service(NAME, parts, _module_encoders(config, s) + topic_encoders(config, s.sonar, s.gps))
-
-
-def _module_encoders(config: RunConfig, s: SensorsConfig) -> list[TopicEncoder]:
-    """Return the encoders of sensors whose modules provide them, and of custom sensors."""
-    result: list[TopicEncoder] = []
-    for p, port in zip(s.instruments, config.services[NAME].ports, strict=True):
-        module = sys.modules[type(p.sensor).__module__]
-        if port.name in PORTS:
-            continue
-        built_in = module.__package__ == __package__ and port.name not in ports.IMUS
-        result += (
-            module.topic_encoders(config.vehicle, port, p) if built_in else [reading_encoder(config.vehicle, port)]
-        )
-    return result
-
-
-def _blank(p: Instrument) -> tuple:
-    return sys.modules[type(p.sensor).__module__].blank()
+    instruments: tuple[Instrument, ...] = settings.parameters
+    parts: list[Block] = []
+    encoders: list[TopicEncoder] = []
+    for p, port in zip(instruments, settings.ports, strict=True):
+        module, inputs = sys.modules[type(p.sensor).__module__], settings.inputs[: 1 + len(p.others)]
+        parts.append(Block(f"{NAME}.{port.name}", p, Cell(module.blank()), inputs, (port,), port.period))
+        if port.name not in PORTS:
+            built_in = module.__package__ == __package__ and port.name not in ports.IMUS
+            encoders += (
+                module.topic_encoders(config.vehicle, port, p) if built_in else [reading_encoder(config.vehicle, port)]
+            )
+    sensors = {port.name: p.sensor for p, port in zip(instruments, settings.ports, strict=True)}
+    return Service(NAME, parts, encoders + topic_encoders(config, sensors))

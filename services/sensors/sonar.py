@@ -18,8 +18,9 @@ from lapwing.services.sensors.delay_line import DEPTH, Fault
 from lapwing.services.sensors.distance import CHANNELS, FARTHEST, DistanceState, blank, initial_state, measure
 from lapwing.services.sensors.sensor_inputs import Truth
 
-__all__ = ["CHANNELS", "PRESETS", "Echo", "Sonar", "blank", "check", "initial", "sample"]
+__all__ = ["CHANNELS", "PRESETS", "READING", "Echo", "Sonar", "blank", "check", "initial", "sample"]
 
+READING = DistanceReading()
 _FADING_LANE = 1  # lane of the random level of an echo, above that of the noise
 _BEL = math.log(10.0)
 

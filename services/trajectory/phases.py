@@ -1,14 +1,20 @@
 """Phases of a trajectory with the segments of each channel."""
 
-from typing import Annotated
+import importlib
+from collections.abc import Iterator
+from types import ModuleType
+from typing import Annotated, Any
 
 from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny, ValidationError, model_validator
 
+from lapwing.cosim.config.user_module import FAULTS, blame
+from lapwing.cosim.scene import Scene
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.validation import fault
-from lapwing.services.trajectory.segments import choose
+from lapwing.services.common import user_code, user_modules
+from lapwing.services.trajectory.polynomial_piece import Piece
+from lapwing.services.trajectory.segments import KINDS, choose
 from lapwing.services.trajectory.segments.segment import Positive, Segment
-from lapwing.services.trajectory.user_segment import UserSegment
 
 
 def _segment(table: object) -> Segment:
@@ -63,3 +69,62 @@ class Phases(BaseModel):
         if duplicates:
             raise ConfigError("phase", f"two phases are named {duplicates[0]!r}; use unique names")
         return self
+
+
+class UserSegment(Segment):
+    """Segment whose class is in a user module. The module is imported when the trajectory is compiled."""
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+    kind: str
+    module: str
+
+    def pieces(self, start: float) -> list[Piece]:
+        """Return the pieces of the user's segment. Raise ConfigError if its class, keys or pieces are invalid."""
+        result = self._call("pieces", start)
+        valid = isinstance(result, list) and all(isinstance(p, Piece) and len(p.polynomial) <= 6 for p in result)
+        if not valid:
+            raise ConfigError(
+                "module", f"pieces of {self.kind} returns {result!r}", "a list of Piece with 6 numbers at most"
+            )
+        return result
+
+    def end(self, start: float) -> float:
+        """Return the value at the end of the user's segment [u]."""
+        return float(self._call("end", start))
+
+    def _call(self, method: str, start: float) -> Any:
+        module = importlib.import_module(self.module)
+        segment = self._segment(module)
+        try:
+            return getattr(segment, method)(start)
+        except ConfigError:
+            raise
+        except FAULTS as error:
+            raise ConfigError("module", f"{self.module}: {blame(error, module)}") from error
+
+    def _segment(self, module: ModuleType) -> Segment:
+        if self.kind in KINDS:
+            raise ConfigError("kind", f"{self.kind} is the name of a built-in kind", "another name")
+        classes = [
+            c for c in vars(module).values() if isinstance(c, type) and issubclass(c, Segment) and c is not Segment
+        ]
+        kinds = {cls.kind_name(): cls for cls in classes}
+        if self.kind not in kinds:
+            raise ConfigError.unknown("kind", f"kind of segment in {self.module}", self.kind, kinds)
+        try:
+            return kinds[self.kind].model_validate({"kind": self.kind, **(self.__pydantic_extra__ or {})})
+        except ValidationError as error:
+            raise fault(error, kinds[self.kind]) from None
+
+
+def load(scene: Scene, segments: Iterator[tuple[str, Segment]]) -> None:
+    """Import the modules of user segments; raise ConfigError if one cannot be imported.
+
+    Args:
+        scene: scene with the modules' texts.
+        segments: pairs of scene key and segment.
+    """
+    texts = user_modules.texts(scene)
+    for key, segment in segments:
+        if isinstance(segment, UserSegment):
+            user_code.load_module(f"{key}.module", segment.module, texts)

@@ -33,15 +33,10 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     core = TrajectoryPath(path, result.final, exchange.interval)
     lead_ticks = max(1, round(LEAD * exchange.rate))
     return ServiceConfig(
-        TrajectoryConfig(core, result.phases, *_leader(trajectory)),
+        TrajectoryConfig(core, result.phases, trajectory.leader or "", trajectory.frame != "world"),
         (InputPort(ports.TRUTH, lead_ticks),),
         (Port(ports.TRAJECTORY, Setpoint()),),
     )
-
-
-def _leader(trajectory: Trajectory) -> tuple[str, bool]:
-    """Return the leader's name and True if displacements are in its heading axes."""
-    return (trajectory.leader, trajectory.frame != "world") if trajectory.leader else ("", False)
 
 
 def fleet(

@@ -48,7 +48,7 @@ from lapwing.dynamics.validation import validated
 from lapwing.services.common import user_modules
 from lapwing.services.common.schemas.environment_schema import EnvironmentTable, environment
 from lapwing.services.common.schemas.vehicle_schema import Vehicle, start_place
-from lapwing.services.trajectory import user_segment, waypoints
+from lapwing.services.trajectory import phases, waypoints
 from lapwing.services.trajectory.phases import Phases
 from lapwing.services.trajectory.segments.segment import Segment
 from lapwing.services.trajectory.trajectory_compiler import CHANNELS, CompiledTrajectory, compile
@@ -133,7 +133,7 @@ def compile_trajectory(scene: Scene) -> CompiledTrajectory:
 
 def _compile(scene: Scene) -> CompiledTrajectory:
     trajectory = scene[Trajectory]
-    user_segment.load(scene, _keyed_segments(trajectory))
+    phases.load(scene, _keyed_segments(trajectory))
     return compile(trajectory, ground=_ground(scene))
 
 

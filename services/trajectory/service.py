@@ -21,7 +21,7 @@ class TrajectoryConfig(NamedTuple):
     core: TrajectoryPath | FollowedPath
     phases: tuple[str, ...]  # names by index
     leader: str = ""  # name of the leader; "": none
-    heading: bool = False  # displacements are in axes along the leader's heading
+    heading: bool = True  # displacements are in axes along the leader's heading
 
 
 def create(config: RunConfig) -> Service:

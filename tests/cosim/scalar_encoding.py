@@ -210,7 +210,7 @@ def sonar(given, time_ns, r):
     return Range(
         header(time_ns, given.vehicle),
         radiation_type=Range.ULTRASOUND,
-        field_of_view=p.field_of_view,
+        field_of_view=math.radians(2.0 * p.half_beam_deg),
         min_range=p.range_min,
         max_range=p.range_max,
         range=r.range if r.valid else math.nan,

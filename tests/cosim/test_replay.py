@@ -12,15 +12,14 @@ import time
 import numpy as np
 import pytest
 
-from lapwing.cli.keyboard import Keyboard
+from lapwing.cli.log_playback import Keyboard
 from lapwing.cosim.log import LogReader, LogWriter
 from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.messages import Clock, stamp
 from lapwing.messages.digest import Digest
 from lapwing.messages.topics import CLOCK
 from lapwing.services.replay import player
-from lapwing.services.replay.playback_clock import Pace
-from lapwing.services.replay.playback_schedule import Cut, schedule
+from lapwing.services.replay.playback_timing import Cut, Pace, schedule
 from tests.endpoints import loopback_endpoints
 
 pytestmark = pytest.mark.long

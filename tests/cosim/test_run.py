@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from lapwing.cosim.log import LogReader
-from lapwing.cosim.log.recover import recover
+from lapwing.cosim.log.log_editing import recover
 from lapwing.cosim.transport.bus import ZenohBus
 from lapwing.messages import BodyStates, VehicleState
 from lapwing.runs.single_process_run import fly_single

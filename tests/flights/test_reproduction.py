@@ -1,7 +1,7 @@
 import pytest
 
 from lapwing.cosim.config import provenance
-from lapwing.flights.logs import reproduction
+from lapwing.flights.logs import log_comparison
 
 RECORDED = {"commit": "abc", "mode": "single-process"}
 
@@ -17,12 +17,12 @@ RECORDED = {"commit": "abc", "mode": "single-process"}
     ],
 )
 def test_expectation_follows_from_commits(monkeypatch, metadata, here, beginning):
-    monkeypatch.setattr(reproduction, "source_commit", lambda: here)
-    assert reproduction.expectation(metadata).startswith(beginning)
+    monkeypatch.setattr(log_comparison, "source_commit", lambda: here)
+    assert log_comparison.expectation(metadata).startswith(beginning)
 
 
 def test_facts_name_this_machine():
-    facts = {fact.name: fact for fact in reproduction.facts({**provenance.machine(), "processor": "armv9"})}
+    facts = {fact.name: fact for fact in log_comparison.facts({**provenance.machine(), "processor": "armv9"})}
     assert facts["python"].recorded == facts["python"].here
     assert facts["processor"].recorded != facts["processor"].here
     assert facts["commit"].recorded == "unknown"

@@ -12,7 +12,7 @@ from lapwing.cli.main import app
 from lapwing.cli.progress import RunProgress
 from lapwing.kernels import kernel
 from lapwing.runs import precompile
-from lapwing.runs.compile_notice import Compilation, notify_on_compile
+from lapwing.runs.observer import Compilation, notify_on_compile
 from lapwing.runs.precompile import compile_ahead
 from lapwing.services.scene_resolver import load, resolve
 

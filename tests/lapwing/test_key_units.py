@@ -7,7 +7,7 @@ import sys
 import pytest
 from page_texts import page_text
 
-from lapwing.file_schemas.key_units import key_units
+from lapwing.file_schemas.json_schema import key_units
 
 
 def test_units_come_from_scene_and_airframe_schemas():

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from lapwing.cli import plan_options
+from lapwing.cli import run_options
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.scene_resolver import load, resolve
 from tests.cosim.memory_log import fly
@@ -17,19 +17,19 @@ PLAN = "lapwing/scenes/plans/delivery.plan"
 
 
 def test_one_vehicle_needs_no_name():
-    assert plan_options.overrides([PLAN], Path("hover"), []) == [
+    assert run_options.plan_overrides([PLAN], Path("hover"), []) == [
         "autopilot.accept_commands=true",
         "autopilot.follow_trajectory=false",
     ]
-    assert list(plan_options.commands([PLAN], load("hover"))) == ["drone1"]
-    assert plan_options.overrides([], Path("hover"), []) == []
+    assert list(run_options.plan_commands([PLAN], load("hover"))) == ["drone1"]
+    assert run_options.plan_overrides([], Path("hover"), []) == []
     with pytest.raises(ValueError, match="expected one plan"):
-        plan_options.files([PLAN, PLAN], load("hover"))
+        run_options.plan_files([PLAN, PLAN], load("hover"))
 
 
 def test_named_vehicles_of_fleet_are_operated():
     values = [f"right={PLAN}"]
-    assert plan_options.overrides(values, Path("fleet"), []) == [
+    assert run_options.plan_overrides(values, Path("fleet"), []) == [
         "vehicle.1.autopilot.accept_commands=true",
         "vehicle.1.autopilot.follow_trajectory=false",
     ]
@@ -45,14 +45,14 @@ def test_named_vehicles_of_fleet_are_operated():
 )
 def test_plan_of_unknown_vehicle_is_rejected(inputs, message):
     with pytest.raises(ValueError, match=rf"{message}; expected NAME=FILE, .*left, right, scout"):
-        plan_options.files(inputs, load("fleet"))
+        run_options.plan_files(inputs, load("fleet"))
 
 
 @pytest.mark.long
 def test_plan_of_one_vehicle_does_not_change_others():
     values, only = [f"right={PLAN}"], ["run.duration=8.0"]
-    scene = load("fleet", [*only, *plan_options.overrides(values, Path("fleet"), only)])
-    flight = fly(resolve(scene, plan_options.commands(values, scene)))
+    scene = load("fleet", [*only, *run_options.plan_overrides(values, Path("fleet"), only)])
+    flight = fly(resolve(scene, run_options.plan_commands(values, scene)))
     assert flight.messages("right/status")[-1].mode == "mission"
     assert flight.view("right/ground_truth").position[-1, 2] > 1.0
     without = fly(resolve(load("fleet", only)))
@@ -125,7 +125,7 @@ def test_skipped_items_are_reported(tmp_path):
     plan = tmp_path / "a.waypoints"
     plan.write_text("QGC WPL 110\n0 1 3 22 0 0 0 nan 40.7686 14.7907 5 1\n1 0 2 183 1 1500 0 0 0 0 0 1\n")
     lines = []
-    plan_options.commands([str(plan)], load("hover"), lines.append)
+    run_options.plan_commands([str(plan)], load("hover"), lines.append)
     assert lines[:-1] == [f"{plan}: item 2, DO_SET_SERVO: skipped, the vehicle has no such output"]
 
 

@@ -9,9 +9,9 @@ from pathlib import Path
 
 from lapwing.cosim.diagram.block_diagram import BlockDiagram, ExternalBlock, Service
 from lapwing.cosim.executors import realtime
-from lapwing.cosim.executors.deadlines import Deadlines
 from lapwing.cosim.executors.log_backpressure import LogBackpressure
 from lapwing.cosim.executors.participant import Participant, Stopped
+from lapwing.cosim.executors.realtime import Deadlines
 from lapwing.cosim.processes.watchdog import SERVICE_LIMIT, Watchdog
 from lapwing.cosim.run_errors import CutShortError, DivergedError
 from lapwing.cosim.transport.bus_keys import BLOCK_TIME_KEY, DEADLINES_KEY, DIVERGED_KEY, ENDED_KEY, REPORTS_KEY
@@ -22,7 +22,7 @@ from lapwing.cosim.transport.packet_exchange import (
     PacketSender,
     packet_receivers,
 )
-from lapwing.cosim.transport.packet_schedule import ticks_per_packet
+from lapwing.cosim.transport.packets import ticks_per_packet
 
 
 def run_lockstep(

@@ -20,7 +20,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Self
 
-from lapwing.cosim.processes.cpu_starvation import PROCESSORS
+from lapwing.cosim.processes.patience import PROCESSORS
 
 PERIOD = 1.0  # [s] of wall time between two checks of the load
 MARGIN = 0.3  # share of a core's time by which another core must be less loaded

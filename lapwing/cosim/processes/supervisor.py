@@ -6,9 +6,9 @@ import time
 from collections.abc import Callable, Iterable, Mapping
 from enum import Enum
 
-from lapwing.cosim.processes import out_of_memory
+from lapwing.cosim.processes import child_process
 from lapwing.cosim.processes.child_process import Child, ChildProcess
-from lapwing.cosim.processes.cpu_starvation import Starvation
+from lapwing.cosim.processes.patience import Starvation
 from lapwing.cosim.processes.run_monitor import LONGEST, MONITOR, STALL, RunMonitor
 from lapwing.cosim.run_errors import ExitCode, RunFailed
 
@@ -63,7 +63,7 @@ class RunSupervisor:
         self._stopped_since: dict[str, float] = {}
         self._ending_since = 0.0
         self._updated = clock()
-        self._killed_before = out_of_memory.kills()
+        self._killed_before = child_process.kills()
 
     def supervise(self, observe: Callable[[RunMonitor], bool]) -> None:
         """Update until the run has ended, or `observe` returns True.
@@ -205,7 +205,7 @@ class RunSupervisor:
 
     def _unexpected_end(self, name: str, code: int) -> RunFailed:
         output = self._children[name].last_line().replace(f": {name}: ", ": ", 1)  # its own messages name it, too
-        killed = code == -signal.SIGKILL and out_of_memory.kills() > self._killed_before
+        killed = code == -signal.SIGKILL and child_process.kills() > self._killed_before
         memory = "; the system killed it for lack of memory" if killed else ""
         return RunFailed(f"{name} ended unexpectedly ({reason(code)}) {self._at()}{output}{memory}")
 

@@ -11,8 +11,15 @@ from lapwing.cosim.diagram.tick_schedule import due
 from lapwing.cosim.executors.participant import PATIENCE, POLL, Participant
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.cosim.transport.bus_keys import BATCH_KEY, WAITING_KEY
-from lapwing.cosim.transport.packet_schedule import EACH_TICK, PacketSchedule, packet_schedule, packet_schedules
-from lapwing.cosim.transport.packets import PacketError, StepPacketCodec, pack_log_packet
+from lapwing.cosim.transport.packets import (
+    EACH_TICK,
+    PacketError,
+    PacketSchedule,
+    StepPacketCodec,
+    pack_log_packet,
+    packet_schedule,
+    packet_schedules,
+)
 from lapwing.kernels import python_function
 from lapwing.messages.topics import Topic
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from lapwing.flights.log_import.log_frames import in_enu_flu
+from lapwing.flights.log_import.log_conventions import in_enu_flu
 from lapwing.flights.log_import.recording import SEA_LEVEL, Recording, Series
 from lapwing.flights.log_import.source_checks import check_velocity, near, with_impossible_readings, with_jumps
 from lapwing.flights.log_import.source_choice import LOWEST_VOLTAGE, Choices, choose, rows_of, runs

@@ -1,12 +1,18 @@
-"""First difference of two logs, and its growth."""
+"""First difference of two logs, and its growth.
 
-from collections.abc import Iterator
+Kernels and resolvers use Lapwing's elementary functions in double precision, so results do not depend on C library,
+processor, and versions of numba, llvmlite and numpy (`make portability`, `make compatibility`). They depend on
+Lapwing's source and on the user's modules.
+"""
+
+from collections.abc import Iterator, Mapping
 from itertools import groupby
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
+from lapwing.cosim.config.provenance import MACHINE, machine, source_commit
 from lapwing.cosim.log import LogReader
 from lapwing.messages import TYPES
 from lapwing.messages.message_diff import first_difference
@@ -129,3 +135,34 @@ def _distances(a: LogReader, b: LogReader, topic: str, names: tuple[str, ...]) -
     times, rows_a, rows_b = np.intersect1d(times_a, times_b, return_indices=True)
     difference = values[1][rows_b].astype(float) - values[0][rows_a].astype(float)
     return times, np.linalg.norm(difference.reshape(len(times), -1), axis=1)
+
+
+UNKNOWN = "unknown"
+
+
+class Fact(NamedTuple):
+    """Property of the machine that recorded a log, and of this machine."""
+
+    name: str
+    recorded: str
+    here: str
+
+
+def facts(metadata: Mapping[str, str]) -> list[Fact]:
+    """Return the properties in a log's metadata with those of this machine."""
+    here = {"commit": source_commit(), **machine()}
+    return [Fact(name, metadata.get(name, UNKNOWN), here[name]) for name in ("commit", *MACHINE)]
+
+
+def expectation(metadata: Mapping[str, str]) -> str:
+    """Return a sentence on the expected result of resimulation on this machine."""
+    if metadata.get("mode") == "imported":
+        return "imported from another program: resimulation is not possible"
+    recorded, here = metadata.get("commit", UNKNOWN), source_commit()
+    if UNKNOWN in (recorded, here):
+        return "unknown: one of the two commits of Lapwing is not known; resimulate the log"
+    if recorded.endswith("+") or here.endswith("+"):
+        return "unknown: Lapwing's source had uncommitted changes; resimulate the log"
+    if recorded != here:
+        return f"not certain: recorded by another commit of Lapwing; check out {recorded}, or resimulate the log"
+    return "equal: same commit of Lapwing; processor, C library and packages do not change bits"

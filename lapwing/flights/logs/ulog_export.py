@@ -11,7 +11,7 @@ import numpy as np
 
 from lapwing.cosim.complete_file import complete_file
 from lapwing.flights.flight_data import FlightData
-from lapwing.flights.log_import.log_frames import FLU
+from lapwing.flights.log_import.log_conventions import FLU
 from lapwing.flights.rotation_arrays import from_ned_frd, from_xyzw, ned_to_enu, specific_force
 from lapwing.messages.topics import ACTUATORS, BATTERY, ESTIMATE, IMU, SETPOINT, TRUTH
 

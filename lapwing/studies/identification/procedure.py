@@ -30,8 +30,8 @@ from lapwing.studies.validation.procedure import (
     read_flights,
     with_windows,
 )
-from lapwing.studies.validation.start_states import TrimMemory
-from lapwing.studies.validation.unmeasured_motion import (
+from lapwing.studies.validation.start_states import (
+    TrimMemory,
     trim_memory,
     unknown_parameters,
     unmeasured_motion,

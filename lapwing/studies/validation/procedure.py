@@ -12,7 +12,6 @@ from lapwing.flights.log_import.open_flight import open_flight
 from lapwing.flights.log_import.recording import Recording
 from lapwing.studies.validation.closed_loop import ClosedLoop, fly_setpoints
 from lapwing.studies.validation.linear_baseline import linear_fit
-from lapwing.studies.validation.measurement_noise import noisier
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.prediction_metrics import (
     FIELDS,
@@ -20,11 +19,19 @@ from lapwing.studies.validation.prediction_metrics import (
     clusters,
     constant_velocity,
     magnitudes,
+    noisier,
     pool,
     ratios,
 )
-from lapwing.studies.validation.start_states import USUAL_TRIM, StartStates, TrimMemory, start_states
-from lapwing.studies.validation.unmeasured_motion import trim_memory, unmeasured_motion, with_made_up_motion
+from lapwing.studies.validation.start_states import (
+    USUAL_TRIM,
+    StartStates,
+    TrimMemory,
+    start_states,
+    trim_memory,
+    unmeasured_motion,
+    with_made_up_motion,
+)
 from lapwing.studies.validation.windows import Errors, compare, predict, thrust_ratio, window_starts, without_window
 
 USABLE = "use flights that leave the ground"

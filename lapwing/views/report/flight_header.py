@@ -3,7 +3,7 @@
 from collections.abc import Iterator
 from typing import Any
 
-from lapwing.cosim.executors.deadlines import MISSED, WORST
+from lapwing.cosim.executors.realtime import MISSED, WORST
 from lapwing.flights.flight_data import FlightData
 from lapwing.flights.flight_provenance import solver_and_exchange
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from lapwing.flights.flight_data import FlightData
-from lapwing.flights.flight_tracking import AXES
+from lapwing.flights.flight_topics import AXES
 from lapwing.views.report.plot import Level, Line, NotRecordedError, Panel, Plot, reference
 
 DEGREES = 180.0 / np.pi  # [deg] in 1 rad

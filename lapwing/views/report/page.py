@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from lapwing.flights.flight_data import FlightData
-from lapwing.flights.flight_tracking import AXES
+from lapwing.flights.flight_topics import AXES
 from lapwing.flights.metrics import unmet_criteria
 from lapwing.flights.tracking import unit_and_factor
 from lapwing.views.report.flight_header import differences, facts

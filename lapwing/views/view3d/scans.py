@@ -14,7 +14,7 @@ from lapwing.messages.topic_columns import history
 from lapwing.messages.topics import DEPTH_IMAGE, LASER_SCAN, POINT_CLOUD, Topic
 from lapwing.services.sensors.depth_camera import pixels
 from lapwing.services.sensors.lidar import azimuths
-from lapwing.services.sensors.registry import parameters
+from lapwing.services.sensors.schema import parameters
 from lapwing.views.view3d.sampling import nearest
 
 BUDGET = 150_000  # largest total number of points of an instrument in a recording, 6 bytes each

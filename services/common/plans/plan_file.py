@@ -1,6 +1,9 @@
 """Flight of a plan from a file: QGroundControl's .plan, or .waypoints (QGC WPL 110).
 
 A plan is refused as a whole before the run starts: no part of it is flown without the others.
+
+Format: MAVLink guide, "File formats". The first row is home, row 0, if it has a waypoint in a global frame: such files
+have the conventions of ArduPilot.
 """
 
 import json
@@ -20,9 +23,8 @@ from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.common.plans.converter import convert, label, notes, refusal
 from lapwing.services.common.plans.fence import Fence
 from lapwing.services.common.plans.plan_item import FENCE, MISSION, RALLY, PlanItem, RefusedItemError
-from lapwing.services.common.plans.qgc_plan import EXPECTED, PlanItems, read_json
+from lapwing.services.common.plans.qgc_plan import EXPECTED, PlanItems, entry, read_json
 from lapwing.services.common.plans.route_checks import check_first_place, ends_in_the_air, forbidden_by, has_place
-from lapwing.services.common.plans.waypoints_file import HEADER, VERSION, read_rows
 from lapwing.services.common.schemas.environment_schema import EnvironmentTable, environment
 from lapwing.services.common.schemas.vehicle_schema import start_place
 
@@ -82,7 +84,8 @@ def read(path: Path, site: Site = ORIGIN) -> Plan:
 def parse(path: Path, text: str, site: Site = ORIGIN) -> Plan:
     """Return the plan with this content. See `read` for errors."""
     try:
-        return _plan(_items(text.removeprefix("\ufeff")), site)
+        text = text.removeprefix("\ufeff")
+        return _plan(read_rows(text) if text.startswith(HEADER) else read_json(json.loads(text)), site)
     except KeyError as error:
         raise ValueError(f"{path}: not a plan: key {error} is missing; {EXPECTED}") from None
     except (TypeError, IndexError, AttributeError, OverflowError):
@@ -93,10 +96,6 @@ def parse(path: Path, text: str, site: Site = ORIGIN) -> Plan:
         raise ValueError(f"{path}: neither JSON (.plan) nor {HEADER} {VERSION} (.waypoints): {error}") from None
     except ValueError as error:
         raise ValueError(f"{path}: {error}") from None
-
-
-def _items(text: str) -> PlanItems:
-    return read_rows(text) if text.startswith(HEADER) else read_json(json.loads(text))
 
 
 def _plan(items: PlanItems, site: Site) -> Plan:
@@ -145,3 +144,31 @@ def _check_places(fence: Fence, items: Sequence[tuple[PlanItem, Any]], site: Sit
         x, y, z = converted.position
         if converted.action not in ("land", "takeoff") and has_place(converted) and z < (height := site.ground(x, y)):
             raise ValueError(f"{label(item)}: {height - z:.3g} m below the ground; raise its altitude")
+
+
+HEADER = "QGC WPL"
+VERSION = "110"
+_COLUMNS = 12
+_HOME = 16, 0  # command and frame of the row that is home
+
+
+def read_rows(text: str) -> PlanItems:
+    """Return the items of a .waypoints file's content. Raise ValueError (one line) for another content."""
+    first, *lines = text.splitlines()
+    if first.removeprefix(HEADER).strip() != VERSION:
+        raise ValueError(f"{first}: unknown version; expected {HEADER} {VERSION}")
+    rows = [line.split() for line in lines if line.strip() and not line.startswith("#")]
+    items, has_home = [], False
+    for number, row in enumerate(rows):
+        with entry(f"row {number}"):
+            if len(row) != _COLUMNS:
+                raise ValueError(f"expected {_COLUMNS} columns, got {len(row)}")
+            index, _, frame, command = (int(float(value)) for value in row[:4])
+            a, b, c, d, latitude, longitude, altitude = map(float, row[4:11])
+            if number == 0 and (command, frame) == _HOME:
+                has_home = True
+                continue
+            shown = number if has_home else number + 1
+            place = latitude, longitude, altitude
+            items.append(PlanItem(shown, index, command, frame, (a, b, c, d), *place, float(row[11]) != 0.0))
+    return PlanItems(items, [], [], has_home)

@@ -4,8 +4,7 @@ from functools import cache
 from selectors import BaseSelector
 
 from lapwing.dynamics import discovery
-from lapwing.services.mavlink.links.link import Link
-from lapwing.services.mavlink.links.receiver import Receiver
+from lapwing.services.mavlink.links.link import Link, Receiver
 
 __all__ = ["Link", "check", "for_vehicle_index", "kinds", "open_link"]
 

@@ -3,10 +3,28 @@
 import re
 import socket
 import time
+from collections import Counter
+from collections.abc import Callable
 from selectors import BaseSelector
-from typing import ClassVar
+from typing import Any, ClassVar, Protocol
 
-from lapwing.services.mavlink.links.receiver import Receiver
+Endpoint = Any  # created by a receiver
+
+
+class Receiver(Protocol):
+    """Receiver of the bytes of endpoints. `Adapter` documents the methods."""
+
+    counts: Counter[str]
+
+    def connect(self, local: bool, datagrams: bool, put: Callable[[bytes], None], strict: bool = False) -> Endpoint:
+        """Return a new endpoint."""
+
+    def disconnect(self, endpoint: Endpoint) -> None:
+        """Remove an endpoint."""
+
+    def receive(self, endpoint: Endpoint, data: bytes) -> int:
+        """Handle bytes from an endpoint. Return the number of valid messages."""
+
 
 ROUND = 64  # pieces of bytes read from one socket before the next socket is read
 PIECE = 2048  # [bytes] longest piece

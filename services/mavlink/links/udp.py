@@ -6,8 +6,7 @@ from selectors import EVENT_READ, BaseSelector
 from typing import ClassVar
 
 from lapwing.services.common.address import is_loopback
-from lapwing.services.mavlink.links.link import MAX_ENDPOINTS, PIECE, ROUND, Link, socket_address
-from lapwing.services.mavlink.links.receiver import Endpoint, Receiver
+from lapwing.services.mavlink.links.link import MAX_ENDPOINTS, PIECE, ROUND, Endpoint, Link, Receiver, socket_address
 
 SILENT = 10.0  # [s] of wall time without a message after which another endpoint may replace it
 

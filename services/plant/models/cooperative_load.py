@@ -25,6 +25,7 @@ from lapwing.services.common.ports import LIFT, TRUTH, BodyMotions, RotorWrenche
 from lapwing.services.common.schemas.communication_schema import Communication, Rates
 from lapwing.services.common.schemas.run_schema import CooperativeLoad
 from lapwing.services.plant.blocks.termination import termination_status
+from lapwing.services.plant.blocks.uncontrolled import motion_alone
 from lapwing.services.plant.models._common import (
     bodies_port,
     check_system,
@@ -67,9 +68,7 @@ def step(
     x = s
     if tick > 0:
         x = integrate_fixed(p.method, g, (tick - 1) * p.interval, x, p.step, p.steps)
-    truth = TrueState(
-        x.load_position, NO_ROTATION, x.load_velocity, ZERO, ZERO, (), (), (), (), (), (), ZERO, 0.0, False, ZERO
-    )
+    truth = motion_alone(x.load_position, NO_ROTATION, x.load_velocity, ZERO)
     nothing = map_index(_zero, x.link, x.link)
     bodies = BodyMotions(
         (x.load_position,) + map_index(quad_position, x.link, g, x),  # noqa: RUF005 (compiled tuples have no unpacking)

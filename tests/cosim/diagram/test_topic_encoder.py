@@ -18,6 +18,7 @@ from lapwing.services.autopilot.commander.commander_output import Status as Word
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.services.sensors.rangefinder import Rangefinder
+from lapwing.services.sensors.sonar import Sonar
 from tests.cosim.scalar_encoding import BUILDERS
 
 SCENES = sorted((Path(__file__).parents[3] / "lapwing/scenes").glob("*.toml"))
@@ -70,10 +71,10 @@ def known(config, services):
         link.status_texts.table += WORDS
         phases, words = phases or ("",), link.status_texts.table
     encoding = values["plant"].encoding
-    sensors = [instrument.sensor for instrument in values["sensors"].instruments] if "sensors" in values else []
+    sensors = [instrument.sensor for instrument in values["sensors"]] if "sensors" in values else []
     return SimpleNamespace(
         vehicle=config.vehicle, cells=encoding.cells, capacity=encoding.capacity, bodies=encoding.bodies,
-        sonar=values["sensors"].sonar if "sensors" in values else None, phases=phases, words=words,
+        sonar=next((sensor for sensor in sensors if isinstance(sensor, Sonar)), None), phases=phases, words=words,
         rangefinder=next((sensor for sensor in sensors if isinstance(sensor, Rangefinder)), None),
     )  # fmt: skip
 

@@ -6,7 +6,7 @@ import sys
 import pytest
 
 from lapwing import Flight
-from lapwing.cosim.executors.deadlines import MISSED, WORST, Deadlines, Lateness, lateness, metadata_entries
+from lapwing.cosim.executors.realtime import MISSED, WORST, Deadlines, Lateness, lateness, metadata_entries
 from lapwing.cosim.log import LogReader
 from lapwing.views.report.flight_header import facts
 

@@ -5,7 +5,7 @@ from mcap.reader import make_reader
 from rosbags.highlevel import AnyReader
 
 from lapwing.cosim.log import LogReader, LogWriter
-from lapwing.cosim.log.append import append
+from lapwing.cosim.log.log_editing import append
 from lapwing.cosim.log.mcap_writer import Container
 from lapwing.messages import Clock, Log, stamp
 

@@ -10,9 +10,15 @@ from types import SimpleNamespace
 import pytest
 
 from lapwing.cosim.access.publisher_ids import PublisherIds
-from lapwing.cosim.processes import cpu_starvation
-from lapwing.cosim.processes.cpu_starvation import QUIET, Starvation, machine_stall_time, starved_time
-from lapwing.cosim.processes.patience import Patience, process_state
+from lapwing.cosim.processes import patience
+from lapwing.cosim.processes.patience import (
+    QUIET,
+    Patience,
+    Starvation,
+    machine_stall_time,
+    process_state,
+    starved_time,
+)
 from lapwing.cosim.processes.run_monitor import LONGEST, RunMonitor
 
 pytestmark = pytest.mark.skipif(not os.path.exists("/proc/self/schedstat"), reason="the system does not tell")
@@ -74,16 +80,16 @@ def test_stall_of_machine_sums_its_counts(monkeypatch, tmp_path):
     assert machine_stall_time() >= 0.0
     (tmp_path / "io").write_text("some avg10=0.10 avg60=0.00 avg300=0.00 total=2500000\nfull avg10=0.00 total=1\n")
     (tmp_path / "stat").write_text("cpu  1 2 3 4 5 6 7 300 9 10\ncpu0 1 2 3 4 5 6 7 8 9 10\n")
-    monkeypatch.setattr(cpu_starvation, "PRESSURE", (tmp_path / "io", tmp_path / "missing"))
-    monkeypatch.setattr(cpu_starvation, "PROCESSORS", tmp_path / "stat")
+    monkeypatch.setattr(patience, "PRESSURE", (tmp_path / "io", tmp_path / "missing"))
+    monkeypatch.setattr(patience, "PROCESSORS", tmp_path / "stat")
     assert machine_stall_time() == 2.5 + 300 / os.sysconf("SC_CLK_TCK")
 
 
 def test_starvation_counts_from_last_message(monkeypatch):
     times = {1: 5.0, 2: 7.0}
     stall = [100.0]
-    monkeypatch.setattr("lapwing.cosim.processes.cpu_starvation.starved_time", times.__getitem__)
-    monkeypatch.setattr("lapwing.cosim.processes.cpu_starvation.machine_stall_time", lambda: stall[0])
+    monkeypatch.setattr("lapwing.cosim.processes.patience.starved_time", times.__getitem__)
+    monkeypatch.setattr("lapwing.cosim.processes.patience.machine_stall_time", lambda: stall[0])
     starvation, pids = Starvation(), {"plant": 1, "sensors": 2}
     starvation.look(pids, 0.0)
     assert starvation.of(pids) == 0.0

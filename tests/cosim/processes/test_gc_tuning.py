@@ -7,7 +7,7 @@ import pytest
 
 END = """
 import atexit
-from lapwing.cosim.processes.gc_tuning import relax_gc
+from lapwing.cosim.processes import relax_gc
 
 class Ring:
     def __init__(self):

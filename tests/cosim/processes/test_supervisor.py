@@ -42,8 +42,8 @@ class Run:
         self.now = 100.0
         monkeypatch.setattr("lapwing.cosim.processes.run_monitor.time.monotonic", lambda: self.now)
         # on a busy machine, the starvation of this process would extend the fake times
-        monkeypatch.setattr("lapwing.cosim.processes.cpu_starvation._scheduled", lambda pid: (0.0, 0.0))
-        monkeypatch.setattr("lapwing.cosim.processes.cpu_starvation.machine_stall_time", lambda: 0.0)
+        monkeypatch.setattr("lapwing.cosim.processes.patience._scheduled", lambda pid: (0.0, 0.0))
+        monkeypatch.setattr("lapwing.cosim.processes.patience.machine_stall_time", lambda: 0.0)
         self.monitor = RunMonitor(bus, PublisherIds("test"), NAMES)
         self.monitor.poll = self.pass_time
         own = [name for name in [*NAMES, "mavlink"] if name not in external]
@@ -193,9 +193,7 @@ def test_optional_process_may_finish_while_there_are_news(run):
 def test_busy_optional_process_is_killed_after_a_minute(monkeypatch, measure):
     run = Run(monkeypatch)
     run.processes["mavlink"].pid = 1 << 29
-    monkeypatch.setattr(
-        f"lapwing.cosim.processes.cpu_starvation.{measure}", lambda pid: run.now if pid == 1 << 29 else 0.0
-    )
+    monkeypatch.setattr(f"lapwing.cosim.processes.patience.{measure}", lambda pid: run.now if pid == 1 << 29 else 0.0)
     run.start()
     run.monitor.ended, run.monitor.outcome = True, ""
     run.update_for(LONGEST - 1.0)
@@ -210,7 +208,7 @@ def test_starved_launcher_reports_no_stall(monkeypatch):
     run = Run(monkeypatch)
     own = os.getpid()
     monkeypatch.setattr(
-        "lapwing.cosim.processes.cpu_starvation.starved_time", lambda pid: 0.9 * run.now if pid == own else 0.0
+        "lapwing.cosim.processes.patience.starved_time", lambda pid: 0.9 * run.now if pid == own else 0.0
     )
     run.start().update_for(15.0)
     assert run.state is RunState.RUNNING

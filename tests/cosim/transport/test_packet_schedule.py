@@ -6,7 +6,7 @@ from hypothesis import strategies as st
 from lapwing.cosim.config.run_config import RunConfig, ServiceConfig
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.run_errors import LockStepError
-from lapwing.cosim.transport.packet_schedule import (
+from lapwing.cosim.transport.packets import (
     EACH_TICK,
     PacketSchedule,
     packet_schedule,

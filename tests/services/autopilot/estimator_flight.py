@@ -15,7 +15,7 @@ from lapwing.services.autopilot import estimator
 from lapwing.services.sensors import barometer, gps, imu, magnetometer, sonar
 from lapwing.services.sensors.delay_line import Fault
 from lapwing.services.sensors.fault_schedule import SLOTS
-from lapwing.services.sensors.registry import sensors
+from lapwing.services.sensors.schema import sensors
 from lapwing.services.sensors.sensor_inputs import Truth
 
 INTERVAL = 0.004  # [s]

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from lapwing.services.autopilot import estimator
-from lapwing.services.sensors import registry
+from lapwing.services.sensors import schema
 
 START, STOP = 16.0, 22.0  # [s]
 
@@ -56,7 +56,7 @@ CASES = [
 @pytest.mark.long
 @pytest.mark.parametrize(("sensor", "fault", "rejected", "largest"), CASES)
 def test_sensor_fault_is_rejected_and_recovers(sensor, fault, rejected, largest):
-    p = registry.parameters(sensor, {"faults": [{"start": START, "stop": STOP, **fault}]}, ef.INTERVAL)
+    p = schema.parameters(sensor, {"faults": [{"start": START, "stop": STOP, **fault}]}, ef.INTERVAL)
     flight = ef.flight(seed=3, instruments=ef.sensor_parameters(**{sensor: p}))
     bits = np.bitwise_or.reduce(flight.rejected[round(START * 10) : round(STOP * 10) + 5])
     named = {name for i, name in enumerate(estimator.SOURCES) if bits >> i & 1}
@@ -72,7 +72,7 @@ def test_sensor_fault_is_rejected_and_recovers(sensor, fault, rejected, largest)
 
 @pytest.mark.long
 def test_health_reports_loss_and_recovery():
-    p = registry.parameters("gps", {"faults": [{"kind": "dropout", "start": START, "stop": STOP}]}, ef.INTERVAL)
+    p = schema.parameters("gps", {"faults": [{"kind": "dropout", "start": START, "stop": STOP}]}, ef.INTERVAL)
     health = ef.flight(seed=3, instruments=ef.sensor_parameters(gps=p)).health
     lost = 1 << estimator.SOURCES.index("gps") | 1 << estimator.SOURCES.index("gps_velocity")
     assert np.all(health[165:215] == lost)

@@ -36,7 +36,7 @@ def test_all_services_share_environment():
     assert gravity(scene) == around.gravity == normal_gravity(47.3)
     air = next(effect for effect in active(scene) if hasattr(effect, "atmosphere"))
     assert air.initial_discrete_state()[0] == density(around.atmosphere, 1600.0)
-    instruments = config.services["sensors"].parameters.instruments
+    instruments = config.services["sensors"].parameters
     assert {instrument.around.home for instrument in instruments} == {around.home}
     filter_ = config.services["autopilot"].parameters.estimator
     assert (filter_.home, filter_.atmosphere, filter_.gravity) == (around.home, around.atmosphere, around.gravity)

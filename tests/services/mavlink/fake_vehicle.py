@@ -23,8 +23,7 @@ from lapwing.messages import (
 )
 from lapwing.messages.topics import COMMAND_ACKS, ESTIMATE, STATUS
 from lapwing.services.common.autopilot_parameters import Parameter
-from lapwing.services.mavlink.link_options import Options
-from lapwing.services.mavlink.link_server import LinkServer
+from lapwing.services.mavlink.link_server import LinkServer, Options
 from lapwing.services.mavlink.resolve import describe
 from lapwing.services.scene_resolver import load
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from record import REST, allan_deviation, record, rms_of_axes
 
-from lapwing.services.sensors import error_models, gps, imu, registry
+from lapwing.services.sensors import error_models, gps, imu, schema
 from lapwing.services.sensors.barometer import PRESETS as BAROMETERS
 from lapwing.services.sensors.magnetometer import PRESETS as MAGNETOMETERS
 from lapwing.services.sensors.sonar import PRESETS as SONARS
@@ -131,7 +131,7 @@ def test_every_noise_has_mean_zero():
         "gps": gps.Gps(0.003, 0.005, 0.02),
     }
     for name, p in sensors.items():
-        ideal = record(name, registry.sensors()[name].PRESETS["ideal"], 1)[0]
+        ideal = record(name, schema.sensors()[name].PRESETS["ideal"], 1)[0]
         error = record(name, p, 50_000) - ideal
         mean, standard_error = error.mean(axis=0), error.std(axis=0) / math.sqrt(len(error))
         assert np.all(np.abs(mean) < 4 * standard_error), name

@@ -12,7 +12,7 @@ from lapwing.runs.observer import Silent
 from lapwing.runs.single_process_run import fly_single
 from lapwing.services.process_main import ProcessSpec
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.services.sensors.registry import module_of
+from lapwing.services.sensors.schema import module_of
 from lapwing.studies.simulate import fly
 
 ANEMOMETER = """

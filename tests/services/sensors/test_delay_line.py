@@ -7,7 +7,7 @@ from lapwing.dynamics.environment import STANDARD
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.noise import stream_key
 from lapwing.dynamics.vector import ZERO
-from lapwing.services.sensors import imu, magnetometer, registry
+from lapwing.services.sensors import imu, magnetometer, schema
 from lapwing.services.sensors.fault_schedule import compile_faults
 from lapwing.services.sensors.sensor_inputs import Truth
 
@@ -18,8 +18,8 @@ TICK = 0.1  # [s]
 
 def fly(fault, sensor="magnetometer", ticks=30):
     """Return the x readings of an ideal magnetometer in a field that grows by 1 T per tick; fault from 1 s to 2 s."""
-    module = registry.sensors()[sensor]
-    p = registry.parameters(sensor, {"preset": "ideal", "faults": [{"start": 1.0, "stop": 2.0, **fault}]}, TICK)
+    module = schema.sensors()[sensor]
+    p = schema.parameters(sensor, {"preset": "ideal", "faults": [{"start": 1.0, "stop": 2.0, **fault}]}, TICK)
     key = stream_key(1, "drone1", sensor)
 
     def truth(tick):

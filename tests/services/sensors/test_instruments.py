@@ -23,7 +23,7 @@ from lapwing.dynamics.noise import stream_key
 from lapwing.dynamics.terrain import LEVEL, relief
 from lapwing.dynamics.vector import ZERO
 from lapwing.services.sensors import airspeed, barometer, gps, imu, magnetometer, optical_flow, rangefinder, sonar
-from lapwing.services.sensors.registry import parameters
+from lapwing.services.sensors.schema import parameters
 from lapwing.services.sensors.sensor_inputs import Truth
 
 pytestmark = pytest.mark.usefixtures("uncompiled")

@@ -9,7 +9,7 @@ import pytest
 from record import REST, record
 from scipy.signal import welch
 
-from lapwing.services.sensors import registry
+from lapwing.services.sensors import schema
 from lapwing.services.sensors.airspeed import PRESETS as AIRSPEEDS
 from lapwing.services.sensors.barometer import PRESETS as BAROMETERS
 from lapwing.services.sensors.imu import PRESETS as IMUS
@@ -40,7 +40,7 @@ DENSITIES = {  # one-sided densities of the channels, and replacements for readi
         {"warm_up_rise": 0.0},
     ),
 }  # fmt: skip
-PARTS = [(name, part) for name in DENSITIES for part in registry.sensors()[name].PRESETS if part != "ideal"]
+PARTS = [(name, part) for name in DENSITIES for part in schema.sensors()[name].PRESETS if part != "ideal"]
 
 
 def test_each_sensor_has_presets_of_two_parts():
@@ -51,7 +51,7 @@ def test_each_sensor_has_presets_of_two_parts():
 @pytest.mark.parametrize(("name", "part"), PARTS)
 def test_spectrum_above_wander_is_stated_density(name, part):
     """One-sided power spectral density above a quarter of the Nyquist frequency, within 4 %."""
-    p = registry.sensors()[name].PRESETS[part]
+    p = schema.sensors()[name].PRESETS[part]
     densities, fine = DENSITIES[name](p)
     f, power = welch(record(name, p._replace(**fine), 60_000, truth=UP), p.rate, nperseg=512, axis=0)
     assert np.sqrt(power[f > p.rate / 8].mean(axis=0)) == pytest.approx(np.array(densities), rel=0.04)

@@ -3,11 +3,11 @@
 import pytest
 
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.services.sensors import registry
+from lapwing.services.sensors import schema
 
 
 def test_sensors_of_folder_are_discovered():
-    assert set(registry.sensors()) == {
+    assert set(schema.sensors()) == {
         "airspeed",
         "barometer",
         "depth_camera",
@@ -21,18 +21,18 @@ def test_sensors_of_folder_are_discovered():
     }
 
 
-@pytest.mark.parametrize("sensor", registry.sensors())
+@pytest.mark.parametrize("sensor", schema.sensors())
 def test_every_preset_passes_its_own_validation(sensor):
-    for name, preset in registry.sensors()[sensor].PRESETS.items():
-        assert registry.parameters(sensor, {"preset": name}, 0.004) == preset
+    for name, preset in schema.sensors()[sensor].PRESETS.items():
+        assert schema.parameters(sensor, {"preset": name}, 0.004) == preset
 
 
 def test_first_preset_is_default():
-    assert registry.parameters("gps", {}, 0.004) == registry.sensors()["gps"].PRESETS["rtk"]
+    assert schema.parameters("gps", {}, 0.004) == schema.sensors()["gps"].PRESETS["rtk"]
 
 
 def test_table_changes_single_values():
-    p = registry.parameters("imu", {"preset": "bmi088", "rate": 500, "gyro": {"turn_on_bias_dps": 1}}, 0.002)
+    p = schema.parameters("imu", {"preset": "bmi088", "rate": 500, "gyro": {"turn_on_bias_dps": 1}}, 0.002)
     assert (p.rate, p.gyro.turn_on_bias_dps, p.gyro.noise_dps_per_sqrt_hz) == (500.0, 1.0, 0.016)
 
 
@@ -50,7 +50,7 @@ def test_table_changes_single_values():
 )
 def test_invalid_table_error_is_one_line(table, words):
     with pytest.raises(ValueError, match=words[0]) as error:
-        registry.parameters("imu", table, 0.004)
+        schema.parameters("imu", table, 0.004)
     assert all(word in str(error.value) for word in words)
     assert "\n" not in str(error.value)
 
@@ -67,24 +67,24 @@ def test_invalid_table_error_is_one_line(table, words):
 )
 def test_invalid_limit_is_rejected(sensor, table, message):
     with pytest.raises(ConfigError, match=message):
-        registry.parameters(sensor, table, 0.004)
+        schema.parameters(sensor, table, 0.004)
 
 
 def test_limit_may_be_infinite():
-    assert registry.parameters("rangefinder", {"range_max": float("inf")}, 0.004).range_max == float("inf")
+    assert schema.parameters("rangefinder", {"range_max": float("inf")}, 0.004).range_max == float("inf")
 
 
 def test_unknown_sensor_lists_choices():
     with pytest.raises(ValueError, match="airspeed, barometer, depth_camera, gps, imu, lidar, magnetometer"):
-        registry.parameters("radar", {}, 0.004)
+        schema.parameters("radar", {}, 0.004)
 
 
 def test_satellites_without_position_are_rejected():
     few = [{"azimuth_deg": a, "elevation_deg": 45.0} for a in (0.0, 120.0, 240.0)]
     with pytest.raises(ValueError, match=r"gps.sky: expected 4 or more, .* got 3 satellites"):
-        registry.parameters("gps", {"sky": few}, 0.004)
+        schema.parameters("gps", {"sky": few}, 0.004)
     cone = [*few, {"azimuth_deg": 60.0, "elevation_deg": 45.0}]
     with pytest.raises(ValueError, match=r"got 4 satellites with a dilution of precision \(PDOP\) of nan"):
-        registry.parameters("gps", {"sky": cone}, 0.004)
+        schema.parameters("gps", {"sky": cone}, 0.004)
     spread = [*few, {"azimuth_deg": 60.0, "elevation_deg": 90.0}]
-    assert len(registry.parameters("gps", {"sky": spread}, 0.004).sky) == 4
+    assert len(schema.parameters("gps", {"sky": spread}, 0.004).sky) == 4

@@ -17,7 +17,7 @@ from lapwing.dynamics.terrain import LEVEL, relief
 from lapwing.dynamics.vector import ZERO
 from lapwing.flights.flight_data import FlightData
 from lapwing.services.common.ports import GPS_FLOAT, GPS_RTK, GPS_SINGLE, GpsReading
-from lapwing.services.sensors import encoders, gps, multipath, registry, satellites
+from lapwing.services.sensors import encoders, gps, multipath, satellites, schema
 from lapwing.services.sensors.multipath import CHIP, WAVELENGTH, Reflections
 from lapwing.services.sensors.rtk import Gap, Rtk
 from lapwing.services.sensors.satellites import Constellation
@@ -274,13 +274,13 @@ def test_messages_contain_kind_of_fix_and_dilution():
 )
 def test_wrong_options_are_rejected(table, message):
     with pytest.raises(ConfigError, match=message):
-        registry.parameters("gps", table, 0.004)
+        schema.parameters("gps", table, 0.004)
 
 
 def test_constellation_excludes_sky():
     sky = [{"azimuth_deg": a, "elevation_deg": e} for a, e in ((0.0, 45.0), (120.0, 45.0), (240.0, 45.0), (60.0, 90.0))]
     with pytest.raises(ConfigError, match=r"gps.constellation: cannot be combined with sky; expected one of them"):
-        registry.parameters("gps", {"sky": sky, "constellation": {}}, 0.004)
+        schema.parameters("gps", {"sky": sky, "constellation": {}}, 0.004)
 
 
 @pytest.mark.long

@@ -15,7 +15,7 @@ from lapwing.dynamics.vehicles.visible_body import visible_body
 from lapwing.flights.flight_data import FlightData
 from lapwing.messages.topics import LASER_SCAN
 from lapwing.services.common.schemas.vehicle_schema import airframe
-from lapwing.services.mavlink.telemetry.obstacle_distance import obstacle_distance
+from lapwing.services.mavlink.telemetry.external_sensors import obstacle_distance
 from lapwing.services.scene_resolver import load, parse, reseed, resolve
 
 SCENE = """
@@ -111,7 +111,7 @@ def test_single_vehicle_sees_no_vehicles(tmp_path):
     alone = alone.replace('name = "seeing"', '[vehicle]\nname = "seeing"')
     sensors = resolve(parse(tmp_path / "alone.toml", alone)).services["sensors"]
     assert [i.port for i in sensors.inputs] == ["truth"]
-    assert all(instrument.others == () for instrument in sensors.parameters.instruments)
+    assert all(instrument.others == () for instrument in sensors.parameters)
 
 
 @pytest.mark.long

@@ -10,11 +10,11 @@ import pytest
 
 from lapwing.cosim.run_errors import RunFailed
 from lapwing.studies import workers
-from lapwing.studies.campaign.cluster import dask
 from lapwing.studies.campaign.folder import begin, manifest
 from lapwing.studies.campaign.plan import plan
 from lapwing.studies.campaign.runs import first_config, reference
 from lapwing.studies.campaign.shard_loop import campaign
+from lapwing.studies.workers import dask
 
 pytestmark = pytest.mark.long
 
@@ -74,6 +74,6 @@ def test_lost_scheduler_is_one_line_and_keeps_runs(tmp_path, capfd):
 
 
 def test_missing_scheduler_is_reported(monkeypatch):
-    monkeypatch.setattr("lapwing.studies.campaign.cluster.SCHEDULER_TIMEOUT", 0.5)
+    monkeypatch.setattr("lapwing.studies.workers.SCHEDULER_TIMEOUT", 0.5)
     with pytest.raises(ValueError, match=r"--cluster tcp://127.0.0.1:9: no Dask scheduler answers"):
         dask("tcp://127.0.0.1:9")

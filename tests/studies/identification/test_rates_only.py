@@ -15,7 +15,7 @@ from lapwing.flights.log_import.open_flight import open_flight
 from lapwing.services.scene_resolver import load_one
 from lapwing.studies.identification.procedure import start_value
 from lapwing.studies.validation.plant_rows import PlantRows
-from lapwing.studies.validation.unmeasured_motion import unknown_parameters, unmeasured_motion, with_made_up_motion
+from lapwing.studies.validation.start_states import unknown_parameters, unmeasured_motion, with_made_up_motion
 
 SCENE, DELAY = "crazyflie_21", 0.02  # [s]
 KEYS = (

@@ -5,9 +5,8 @@ import pytest
 from flight_recordings import INTERVAL, simulated
 
 from lapwing.flights.rotation_arrays import rotation_vector
-from lapwing.studies.validation.measurement_noise import noisier
 from lapwing.studies.validation.plant_rows import PlantRows
-from lapwing.studies.validation.prediction_metrics import FIELDS, Metric
+from lapwing.studies.validation.prediction_metrics import FIELDS, Metric, noisier
 from lapwing.studies.validation.procedure import TrimMemory, Validation, compare_with_flights
 from lapwing.studies.validation.start_states import USUAL_TRIM
 from lapwing.studies.validation.verdict import BETTER, OPEN, WORSE, facts, sentence, uses

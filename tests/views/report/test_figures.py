@@ -8,7 +8,7 @@ from circle_report import ESTIMATE_ERROR, OFFSET, RATE, SECONDS, THRUST, TORQUE,
 from scipy.spatial.transform import Rotation
 
 from lapwing.flights.flight_data import FlightData
-from lapwing.flights.flight_tracking import AXES
+from lapwing.flights.flight_topics import AXES
 from lapwing.flights.rotation_arrays import conjugate, from_xyzw, product, rotation_vector
 from lapwing.messages import Estimate, Point, Pose, Quaternion, VehicleState, header
 from lapwing.views.report.flight_phases import phases

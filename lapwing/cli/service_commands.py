@@ -1,14 +1,13 @@
-"""`lapwing service`: one service of a run whose services are started separately."""
+"""`lapwing service`, `protocol` and `certificates`: services that are started separately."""
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated
+from typing import Annotated, Any
 
 import typer
 
-from lapwing.cli import plan_options
+from lapwing.cli import run_options
 from lapwing.cli.app import app
-from lapwing.cli.endpoint_checks import check_endpoints
 from lapwing.cli.options import (
     KeyPrefix,
     Keys,
@@ -22,7 +21,10 @@ from lapwing.cli.options import (
     parse_speed,
     with_options,
 )
+from lapwing.cli.output_paths import check_distinct, check_not_dash, claim, claim_plot
 from lapwing.cli.preflight import with_solver_selected
+from lapwing.cli.run_options import check_endpoints
+from lapwing.cosim.complete_file import write_text
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,8 +76,8 @@ def service(options: ServiceOptions) -> None:
         raise ValueError(f"service {name}: expected {required[name][0]}")
     speed = parse_speed(options.speed)
     options.validate_links()
-    loaded = with_solver_selected(scene, [*overrides, *plan_options.overrides(plan, scene, overrides)])
-    config = resolve(loaded, plan_options.commands(plan, loaded))
+    loaded = with_solver_selected(scene, [*overrides, *run_options.plan_overrides(plan, scene, overrides)])
+    config = resolve(loaded, run_options.plan_commands(plan, loaded))
     check_pace(f"--speed {options.speed}", speed, config.interval)
     if entry.lock_step and entry.name not in config.services:
         typer.echo(f"{name}: not part of {scene}")  # compose starts every service
@@ -95,3 +97,71 @@ def service(options: ServiceOptions) -> None:
             **options.spec,
         )
     )
+
+
+@app.command()
+def protocol(
+    scene: SceneFile,
+    set_: Overrides = None,
+    json: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="write the protocol and the run configuration as JSON")
+    ] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FILE", help="write a diagram of the services (PNG, SVG or PDF)")
+    ] = None,
+) -> None:
+    """Show the ports, periods and columns of each service.
+
+    docs/reference/protocol.md describes the protocol for external services.
+    """
+    import json as json_module
+
+    from lapwing.cosim.transport.packets import layout
+    from lapwing.services.scene_resolver import resolve
+
+    check_distinct({"SCENE": scene, "--json": json, "--plot": plot})
+    claim(json)
+    claim_plot(plot)
+    config = resolve(with_solver_selected(scene, set_ or []))
+    result = layout(config)
+    if plot:
+        from lapwing.views.service_diagram import draw
+
+        draw(config, plot)
+    if json:
+        write_text(json, json_module.dumps(result, indent=1) + "\n")
+    if json or plot:
+        return
+    typer.echo(f"{result['rate']} Hz, {result['interval_ns']} ns per tick, last tick {result['last_tick']}")
+    for name in result["order"]:
+        _show(name, result["services"][name])
+
+
+def _show(name: str, service: dict[str, Any]) -> None:
+    typer.echo(f"\n{name}")
+    for port in service["inputs"]:
+        typer.echo(f"  input {port['port']}" + (f", delayed by {port['delay']} ticks" if port["delay"] else ""))
+    for port in service["ports"]:
+        every = "every tick" if port["period"] == 1 else f"every {port['period']} ticks"
+        typer.echo(f"  output {port['name']}, {every}: {len(port['columns'])} columns")
+        for offset, column in enumerate(port["columns"]):
+            typer.echo(f"    {8 * offset:5d}  {column}")
+
+
+@app.command()
+def certificates(
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="folder to create")],
+    days: Annotated[int, typer.Option(metavar="N", min=1, max=3650, help="validity [days]")] = 365,
+) -> None:
+    """Create TLS certificates for runs on several hosts.
+
+    Writes a certificate for each service and a read-only one for viewers to FOLDER.
+    """
+    from lapwing.cosim.access.certificates import make
+    from lapwing.cosim.access.zenoh_access import VIEWER
+    from lapwing.services.security import names
+
+    check_not_dash(folder)
+    holders = [*names(), VIEWER]
+    make(folder, holders, days)
+    typer.echo(f"{folder}: certificates of {', '.join(holders)}; copy to each host only its own; do not commit them")

@@ -1,11 +1,11 @@
-"""Addition of a topic to a complete log, after its other messages."""
+"""Changes of logs: addition of a topic to a complete log, recovery of a damaged one."""
 
 import struct
 from collections.abc import Sequence
 from contextlib import closing, suppress
 from io import FileIO
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from mcap.exceptions import McapError
 from mcap.reader import make_reader
@@ -14,6 +14,8 @@ from mcap.summary import Summary
 from mcap.writer import MCAP0_MAGIC
 
 from lapwing.cosim.log.chunk import WrittenTopic, arrange, rows_of
+from lapwing.cosim.log.log_reader import LogReader
+from lapwing.cosim.log.log_writer import LogWriter
 from lapwing.cosim.log.mcap_writer import DETERMINISTIC, Container
 from lapwing.cosim.output_lock import lock_descriptor
 
@@ -77,3 +79,39 @@ def _append(
             file.write(before)
             file.truncate()
         raise
+
+
+RECOVERED = "recovered"  # key in the metadata: the original file, and its defects
+
+
+class RecoveryResult(NamedTuple):
+    """Messages that `recover` has saved from a damaged log."""
+
+    messages: int
+    end_ns: int  # time of the last message
+    damaged: tuple[str, ...]  # a line for each chunk that was left out
+    digest: str  # digest of the recovered messages
+
+
+def recover(path: Path, out: Path) -> RecoveryResult:
+    """Write all complete chunks of a log into a new log, with index, digest and end.
+
+    Raises:
+        ValueError: `path` is not an MCAP log, is undamaged, or has other message types, or `out` cannot be written.
+    """
+    with LogReader(path, skip_damaged=True) as log:
+        if log.complete and not log.damaged:
+            raise ValueError(f"{path}: is complete and undamaged; no recovery is needed")
+        log.check_versions()
+        defects = "; ".join([*log.damaged, *([] if log.complete else ["it has no end"])])
+        metadata = {key: value for key, value in log.metadata.items() if key != "digest"}
+        deterministic, count, end_ns = log.deterministic_topics(), 0, 0
+        try:
+            with LogWriter(out, metadata | {RECOVERED: f"{path.name}: {defects}"}, dict(log.attachments)) as writer:
+                for topic, kind, time_ns, payload in log.messages():
+                    writer.write(topic, kind, payload, time_ns, topic in deterministic)
+                    count, end_ns = count + 1, time_ns
+        except ValueError:
+            out.unlink(missing_ok=True)
+            raise
+        return RecoveryResult(count, end_ns, log.damaged, writer.metadata["digest"])
