@@ -7,7 +7,6 @@ from lapwing.cosim.config.serialise import digest, first_difference, from_json, 
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.services.scene_resolver import load, resolve
-from tests.cosim.memory_log import fly
 from tests.cosim.small_graph import config_of
 from tests.golden.cases import CASES
 
@@ -32,12 +31,6 @@ def test_resolution_is_deterministic_and_overrides_change_it():
     path, before, after = first_difference(resolved(), resolved("airframe.mass.total=9.5"))
     assert path == "services.autopilot.parameters.airframe.mass"
     assert after == 9.5 != before
-
-
-@pytest.mark.long
-def test_configuration_restored_from_text_flies_to_same_digest():
-    config = resolve(load("delivery_mission", ["run.duration=0.4"]))
-    assert fly(from_json(to_json(config))).digest == fly(config).digest
 
 
 def test_port_and_producer_are_found_by_name():

@@ -48,18 +48,18 @@ def diagram(*names):
     return graph_of(User(*names), ports=PORTS, kept_ticks=16)
 
 
-def filled(tick):
-    """Return a diagram with values of the due ports at `tick`."""
+def run_of(ticks):
+    """Return a diagram with values of the due ports at each tick in [0, ticks)."""
     result = diagram("pair", "slow", "slower")
     for port in PORTS:
-        if tick % port.period == 0:
+        for tick in range(0, ticks, port.period):
             result.put(port.name, tick, type(port.example)(tick + 0.5, True if port.name == "slow" else -float(tick)))
     return result
 
 
 @pytest.mark.parametrize(("tick", "numbers"), [(0, 6), (3, 2), (5, 4), (10, 6)])
 def test_step_packet_holds_due_rows_in_order(tick, numbers):
-    codec, producer, consumer = StepPacketCodec(PORTS), filled(tick), diagram("slower", "pair", "slow")
+    codec, producer, consumer = StepPacketCodec(PORTS), run_of(tick + 1), diagram("slower", "pair", "slow")
     payload = codec.pack(producer, tick)
     expected = [tick + 0.5, -float(tick), tick + 0.5, 1.0, tick + 0.5, -float(tick)][:numbers]
     assert np.frombuffer(payload, "<f8").tolist() == expected
@@ -71,7 +71,7 @@ def test_step_packet_holds_due_rows_in_order(tick, numbers):
 
 def test_diagram_stores_ports_in_use_only():
     consumer = diagram("slow")
-    StepPacketCodec(PORTS).unpack(StepPacketCodec(PORTS).pack(filled(10), 10), consumer, 10)
+    StepPacketCodec(PORTS).unpack(StepPacketCodec(PORTS).pack(run_of(11), 10), consumer, 10)
     assert consumer.latest("slow", 10) == Single(10.5, True)
     assert not consumer.has("pair")
 
@@ -80,15 +80,6 @@ def test_service_without_due_port_has_no_packet():
     assert [tick for tick in range(12) if StepPacketCodec(PORTS[1:]).due(tick)] == [0, 5, 10]
     assert all(StepPacketCodec(PORTS).due(tick) for tick in range(12))
     assert not StepPacketCodec(()).due(0)
-
-
-def run_of(ticks):
-    """Return a diagram with values of the due ports at each tick in [0, ticks)."""
-    result = diagram("pair", "slow", "slower")
-    for port in PORTS:
-        for tick in range(0, ticks, port.period):
-            result.put(port.name, tick, type(port.example)(tick + 0.5, True if port.name == "slow" else -float(tick)))
-    return result
 
 
 @pytest.mark.parametrize("ticks", [2, 3, 4, 7, 12])

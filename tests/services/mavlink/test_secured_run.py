@@ -127,16 +127,6 @@ def test_http_post_to_tcp_link_is_closed_and_does_not_arm(tmp_path):
     assert commands(process.log) <= {"link"}
 
 
-def test_command_before_heartbeat_is_denied(tmp_path):
-    port = free_port()
-    with run(tmp_path, "silent", "--mavlink", f"udpin:127.0.0.1:{port}") as process:
-        Station(f"udpout:127.0.0.1:{port}").await_vehicle(process)
-        silent = Station(f"udpout:127.0.0.1:{port}")
-        assert silent.command(ARM, 1.0, 21196.0) == mavlink.MAV_RESULT_DENIED
-        silent.link.mav.heartbeat_send(6, 8, 0, 0, 0)
-        assert silent.command(ARM, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
-
-
 @pytest.mark.parametrize(
     "kind", ["mavlink", *(pytest.param(k, marks=pytest.mark.nightly) for k in ("foxglove", "ros2", "time stamps"))]
 )
