@@ -1,15 +1,13 @@
 """Every option of every command is used by a test that runs the command as a process."""
 
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 import typer
 
 from lapwing.cli.main import app
+from tests.commands import run_command
 
 SHORT = "--set run.duration=0.2 --set success.require=[]"
 GYROSTAT = Path("lapwing/scenes/gyrostat_blocked.toml").resolve()  # without a path, it names an accuracy problem
@@ -166,10 +164,7 @@ def folder(tmp_path_factory):
 def test_command_runs_with_its_options(folder, name):
     if name == "recover":
         (folder / "cut.mcap").write_bytes((folder / "a.mcap").read_bytes()[:-500])
-    command = [sys.executable, "-m", "lapwing", *COMMANDS[name].split()]
-    environment = os.environ | {"PYTHONPATH": str(Path.cwd())}
-    result = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
-    assert result.returncode == 0, result.stderr
+    result = run_command(*COMMANDS[name].split(), code=0, folder=folder)
     assert "Traceback" not in result.stderr
 
 

@@ -18,6 +18,7 @@ from lapwing.messages import VehicleState
 from lapwing.runs.single_process_run import fly_single
 from lapwing.services.scene_resolver import load, resolve
 from tests.combinations import MISSION
+from tests.commands import assert_rejected, run_command
 from tests.endpoints import loopback_endpoints
 from tests.participants import participants, running
 
@@ -240,9 +241,5 @@ def test_user_error_at_start_of_service_is_one_line(tmp_path):
     with socket.create_server(("127.0.0.1", 0)) as taken:
         door = f"tcp/127.0.0.1:{taken.getsockname()[1]}"
         command = arguments(tmp_path, "test-door", "--listen", door, "--insecure")
-        result = subprocess.run(command, capture_output=True, text=True, timeout=STARTED, check=False)
-    assert result.returncode == 2
-    assert result.stderr.startswith("lapwing: router: cannot listen on tcp/127.0.0.1:")
-    assert door in result.stderr
-    assert result.stderr.count("\n") == 1
+        assert_rejected(run_command(*command[3:]), f"lapwing: router: cannot listen on {door}")
     assert not (tmp_path / "test-door.mcap").exists()

@@ -12,6 +12,7 @@ import lapwing
 from lapwing.cli.app import FIRST, GROUPS
 from lapwing.cosim.transport.bus_keys import check_key_prefix
 from lapwing.runs import single_process_run
+from tests.commands import run_command
 
 ROOT = Path.cwd()
 HOVER, DELIVERY = "scenes/hover.toml", "scenes/delivery_mission.toml"
@@ -301,9 +302,7 @@ def test_process_rejects_input_in_one_line_and_writes_no_file(tmp_path, argument
 
 
 def test_command_shows_no_traceback():
-    command = [sys.executable, "-m", "lapwing", "run", "scenes/none.toml"]
-    result = subprocess.run(command, capture_output=True, text=True, timeout=300, check=False)
-    assert result.returncode == 2
+    result = run_command("run", "scenes/none.toml", code=2)
     assert result.stderr.startswith("lapwing: scenes/none.toml: no such file")
     assert result.stderr.count("\n") == 1
 

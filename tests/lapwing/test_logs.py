@@ -16,6 +16,7 @@ from scipy.io import loadmat
 
 from lapwing.cosim.log import LogReader, LogWriter
 from lapwing.messages import Clock, Point, Pose, Status, VehicleState, header, stamp
+from tests.commands import run_command
 
 TICK = 4_000_000  # [ns]
 ABOUT = {"scene": "made_up", "seed": "7", "version": "0.1", "solver_integrator": "rk4", "solver_step": "0.001"}
@@ -72,9 +73,7 @@ def test_verify_explains_log_of_another_machine(tmp_path):
     path = write(tmp_path / "a.mcap", commit="0123456789ab", **recorded)
 
     def explain():
-        command = [sys.executable, "-m", "lapwing", "verify", str(path), "--explain"]
-        environment = {**os.environ, "LAPWING_COMMIT": "0123456789ab"}
-        return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        return run_command("verify", path, "--explain", LAPWING_COMMIT="0123456789ab")
 
     result = explain()
     assert result.returncode == 0, result.stderr

@@ -13,14 +13,14 @@ import pytest
 import lapwing as package
 from lapwing.views.view3d import headless
 from lapwing.views.view3d.render import Shot, write_film
+from tests.commands import run_command
 
 pytest.importorskip("viser", reason="needs viser (pip install lapwing[view3d])")
 SMALL = ("--size", "160x120")
 
 
 def run(folder, *words):
-    command = [sys.executable, "-m", "lapwing", "render", *map(str, words)]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    return run_command("render", *words, folder=folder)
 
 
 @pytest.fixture(scope="module")

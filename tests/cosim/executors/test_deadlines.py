@@ -1,14 +1,12 @@
 """Missed deadlines are counted by service, in the log and report of a real-time run."""
 
-import subprocess
-import sys
-
 import pytest
 
 from lapwing import Flight
 from lapwing.cosim.executors.deadlines import MISSED, WORST, Deadlines, Lateness, lateness, metadata_entries
 from lapwing.cosim.log import LogReader
 from lapwing.views.report.flight_header import facts
+from tests.commands import run_command
 
 pytestmark = pytest.mark.long
 
@@ -35,8 +33,7 @@ def test_invalid_lateness_is_rejected(messages):
 def test_log_has_lateness_of_paced_run(tmp_path, more, paced):
     log = tmp_path / "log.mcap"
     command = ["run", "gyrostat_blocked", "--set", "run.duration=1.0", *more, "--log", log]
-    done = subprocess.run([sys.executable, "-m", "lapwing", *command], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    done = run_command(*command, code=0)
     assert "Traceback" not in done.stderr
     with LogReader(log) as read:
         assert (MISSED in read.metadata) == paced

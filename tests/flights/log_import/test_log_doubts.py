@@ -1,7 +1,5 @@
 """Fields with which a log says not to believe a value: validity, resets, dropouts, fixes, datums and instances."""
 
-import subprocess
-import sys
 from dataclasses import replace
 
 import flight_writers
@@ -21,6 +19,7 @@ from lapwing.flights.flight_data import FlightData
 from lapwing.flights.log_import.open_flight import open_flight
 from lapwing.flights.log_import.source_choice import choices_of
 from lapwing.flights.log_import.write_log import write_log
+from tests.commands import assert_rejected, run_command
 
 JUMP = 200  # first sample after a reset
 FLAGS = "uint8_t xy_valid;uint8_t z_valid;uint8_t v_xy_valid;uint8_t v_z_valid;uint8_t xy_reset_counter;"
@@ -254,9 +253,8 @@ def test_command_ends_with_table_and_takes_instance(tmp_path, flight):
     power = ULOG["battery_status"]
     topics = [("battery_status", n, power, "2f", lambda k, n=n: (n * 3.0, 1.0)) for n in (0, 1, 2)]
     path = write_ulog_topics(tmp_path / "f.ulg", flight, topics)
-    command = [sys.executable, "-m", "lapwing", "import", str(path), "--out", str(tmp_path / "f.mcap")]
-    done = subprocess.run([*command, "--instance", "battery=2"], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    command = ["import", path, "--out", tmp_path / "f.mcap"]
+    done = run_command(*command, "--instance", "battery=2", code=0)
     lines = done.stdout.splitlines()
     head = next(k for k, line in enumerate(lines) if line.startswith(" signal "))
     cells = {line.split()[0]: line.split() for line in lines[head + 1 :] if line.strip()}
@@ -264,6 +262,4 @@ def test_command_ends_with_table_and_takes_instance(tmp_path, flight):
     assert cells["origin"] == ["origin"]
     assert cells["battery"][1:3] == ["battery_status", "2"]
     assert FlightData.read(tmp_path / "f.mcap").topic("battery").voltage == pytest.approx(6.0)
-    refused = subprocess.run([*command, "--instance", "battery"], capture_output=True, text=True)
-    assert (refused.returncode, refused.stderr.count("\n")) == (2, 1)
-    assert "expected NAME=N" in refused.stderr
+    assert_rejected(run_command(*command, "--instance", "battery"), "expected NAME=N")

@@ -1,7 +1,5 @@
 """Named inputs of effects in fleets, and of a Thevenin battery and motors with inductance."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -12,6 +10,7 @@ pytest.importorskip("fmpy")
 
 from lapwing import read_log
 from tests.combinations import NIGHTLY
+from tests.commands import assert_rejected, run_command
 
 SCENES = Path("lapwing/scenes").resolve()
 WIND = """
@@ -39,14 +38,9 @@ current_3 = "truth.motor_current.3"
 """
 
 
-def run_command(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", "lapwing", *arguments], capture_output=True, text=True, check=False)
-
-
 def fly(scene: Path, log: Path) -> None:
     options = ["--allow-code", "--mode", "single-process", "--set", "run.duration=0.4", "--set", "success.require=[]"]
-    done = run_command("run", str(scene), "--log", str(log), *options)
-    assert done.returncode == 0, done.stderr
+    run_command("run", scene, "--log", log, *options, code=0)
 
 
 @pytest.mark.long
@@ -62,10 +56,7 @@ def test_vehicles_of_fleet_have_winds_of_own_fmus(tmp_path: Path) -> None:
     for vehicle, wind in (("left", 3.0), ("right", -2.0), ("scout", 1.0)):
         winds = read_log(log).fleet[vehicle].wind
         assert np.array_equal(winds[1:], np.tile([wind, 0.5, 0.0], (len(winds) - 1, 1))), vehicle
-    done = run_command("resimulate", str(log))
-    assert done.returncode == 2
-    assert "has FMUs, machine code of their authors" in done.stderr
-    assert done.stderr.count("\n") == 1
+    assert_rejected(run_command("resimulate", log), "has FMUs, machine code of their authors")
 
 
 @pytest.mark.long

@@ -12,6 +12,7 @@ import pytest
 from lapwing.cosim.log import LogReader, LogWriter
 from lapwing.messages import Clock, Imu, header, stamp
 from lapwing.services.foxglove.server import Server, check_address, parse_address
+from tests.commands import run_command
 from tests.endpoints import loopback_endpoints
 from tests.services.foxglove.client import Client, patient
 
@@ -167,8 +168,7 @@ def test_local_address_is_accepted(text):
 
 def test_run_with_remote_viewers_is_rejected(tmp_path):
     words = ["run", "hover", "--foxglove", "0.0.0.0:8799", "--log", str(tmp_path / "a.mcap")]
-    run = subprocess.run([sys.executable, "-m", "lapwing", *words], capture_output=True, text=True, timeout=300)
-    assert run.returncode == 2
+    run = run_command(*words, code=2)
     assert re.fullmatch(r"lapwing: --foxglove 0.0.0.0:8799: any program there could read the run; .*\n", run.stderr)
     assert not list(tmp_path.iterdir())
 

@@ -10,6 +10,7 @@ from fake_vehicle import free_port
 from pymavlink import mavutil
 
 from lapwing.services.common.mavlink.dialect import mavlink
+from tests.commands import run_command
 
 pytestmark = pytest.mark.long
 
@@ -25,8 +26,7 @@ def as_float(value):
 
 def lapwing(*arguments):
     """Run a command, and return its output."""
-    command = [sys.executable, "-m", "lapwing", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=WAIT, check=True).stdout
+    return run_command(*arguments, code=0).stdout
 
 
 class Station:

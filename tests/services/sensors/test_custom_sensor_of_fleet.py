@@ -1,14 +1,13 @@
 """Custom sensor that sees the other vehicles: the example of the guide, through the command."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import lapwing
+from tests.commands import run_command
 
 GUIDE = Path("docs/guides/extensions.md").read_text().partition("## Sensors of fleets")[2]
 PROXIMITY = re.search(r"```python\n(.*?)```", GUIDE, re.DOTALL)[1]
@@ -18,8 +17,7 @@ SHORT = ("--set", "run.duration=2", "--set", "success.require=[]", "--mode", "si
 def run(folder, scene, text=PROXIMITY):
     (folder / "proximity.py").write_text(text)
     settings = ("--set", "sensors.proximity.module=proximity", *SHORT)
-    words = [sys.executable, "-m", "lapwing", "run", scene, *settings, "--log", "flight.mcap"]
-    return subprocess.run(words, cwd=folder, capture_output=True, text=True, check=False)
+    return run_command("run", scene, *settings, "--log", "flight.mcap", folder=folder)
 
 
 @pytest.mark.nightly

@@ -1,8 +1,6 @@
 """Presets of real sensors: spectrum of the readings, and values of the data sheets."""
 
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -17,6 +15,7 @@ from lapwing.services.sensors.magnetometer import PRESETS as MAGNETOMETERS
 from lapwing.services.sensors.optical_flow import PRESETS as FLOWS
 from lapwing.services.sensors.rangefinder import PRESETS as RANGEFINDERS
 from lapwing.services.sensors.sonar import PRESETS as SONARS
+from tests.commands import run_command
 
 DPS, MG, PSI = math.radians(1.0), 1e-3 * 9.80665, 6894.757
 UP = REST._replace(position_world=(0.0, 0.0, 2.0))
@@ -148,6 +147,4 @@ def test_run_command_flies_with_second_presets(tmp_path):
     }  # fmt: skip
     values = [f"sensors.{name}.preset={part}" for name, part in parts.items()]
     sets = [part for text in (*values, "run.duration=1.0", "success.require=[]") for part in ("--set", text)]
-    command = [sys.executable, "-m", "lapwing", "run", "quad_x", *sets, "--mode", "single-process"]
-    done = subprocess.run([*command, "--log", str(tmp_path / "a.mcap")], capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
+    run_command("run", "quad_x", *sets, "--mode", "single-process", "--log", tmp_path / "a.mcap", code=0)

@@ -4,8 +4,6 @@ import errno
 import json
 import os
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -24,6 +22,7 @@ from lapwing.studies.campaign.results import Results
 from lapwing.studies.campaign.runs import first_config, fly_runs, reference, row_of
 from lapwing.studies.campaign.shard_loop import Count, StoppingRule, campaign
 from lapwing.studies.campaign.statistics import interval
+from tests.commands import run_command
 
 pytestmark = pytest.mark.long
 
@@ -362,9 +361,7 @@ def test_invalid_input_is_one_line(arguments, message, tmp_path):
 
 
 def run_campaign(*arguments, cwd):
-    environment = os.environ | {"PYTHONPATH": str(Path.cwd()), "COLUMNS": "80"}
-    command = [sys.executable, "-m", "lapwing", "campaign", *arguments, "--workers", "1", "--out", "c"]
-    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=280, check=False)
+    return run_command("campaign", *arguments, "--workers", "1", "--out", "c", folder=cwd, COLUMNS="80")
 
 
 def test_resumed_command_counts_all_runs(tmp_path):

@@ -3,8 +3,6 @@
 import contextlib
 import json
 import math
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -24,6 +22,7 @@ from lapwing.studies.effects.variants import Change, changes, check_effects, fly
 from lapwing.views.studies import effects_result
 from lapwing.views.studies.study_result import show, write_json, write_plot
 from lapwing.views.terminal import console
+from tests.commands import run_command
 
 SCENES = Path(__file__).parents[3] / "lapwing/scenes"
 HOVER = SCENES / "hover.toml"
@@ -220,9 +219,7 @@ z = { kind = "minimum_jerk", to = 1.0, duration = 2.0 }
 def test_command_shows_that_stacked_vehicles_need_downwash(tmp_path):
     scene, path = tmp_path / "stacked.toml", tmp_path / "effects.json"
     scene.write_text(STACKED)
-    command = [sys.executable, "-m", "lapwing", "effects", str(scene), "--only", "downwash,collision"]
-    done = subprocess.run([*command, "--json", str(path)], capture_output=True, text=True, timeout=900, check=False)
-    assert done.returncode == 0, done.stderr
+    done = run_command("effects", scene, "--only", "downwash,collision", "--json", path, code=0)
     result = json.loads(path.read_text())
     rows = {row["name"]: row for row in result["rows"]}
     assert rows["downwash"]["influence"]["trajectory"] > 0.01
