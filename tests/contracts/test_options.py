@@ -91,7 +91,7 @@ ELSEWHERE = {  # other tests by option; a test's file contains the option
         "--external": "tests/examples/test_rust_controller.py",
         "--keys": "tests/cosim/test_join.py",
         "--view": "tests/lapwing/test_live.py",
-        "--realtime": "tests/cosim/executors/test_deadlines.py",
+        "--realtime": "tests/cosim/executors/test_lockstep.py",
     },
     "service": {
         "--set": "tests/lapwing/test_joined.py",
@@ -107,7 +107,7 @@ ELSEWHERE = {  # other tests by option; a test's file contains the option
         "--ros2": "tests/services/ros2/test_service.py",
         "--ros2-router": "tests/services/ros2/test_service.py",
     },
-    "effects": {"--list": "tests/lapwing/test_descriptions.py::test_list_has_every_effect_and_key"},
+    "effects": {"--list": "tests/lapwing/test_key_docs.py::test_list_has_every_effect_and_key"},
     "test": dict.fromkeys(("--junit", "--keep"), "tests/lapwing/test_scene_tests.py"),
     "check": {"--allow-code": "tests/fmi/importer/test_import.py"},
     "campaign": {

@@ -1,6 +1,6 @@
 """Limits of the environment and a killed process, through the real command: one line that names the cause.
 
-`tests/faults/test_memory_pressure.py` limits the memory.
+`tests/faults/test_faults.py` limits the memory.
 """
 
 import os

@@ -1,4 +1,4 @@
-"""Step packets and log packets: round trips, and rejection of invalid packets."""
+"""Step packets and log packets: layout, round trips, and rejection of invalid packets."""
 
 from typing import NamedTuple
 
@@ -7,10 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lapwing.cosim.config.serialise import to_json
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.diagram.topic_encoder import RecordBatch
+from lapwing.cosim.transport.packet_layout import columns, layout
 from lapwing.cosim.transport.packets import PacketError, StepPacketCodec, pack_log_packet, unpack_log_packet
+from lapwing.kernels.row_packing import pack_row
 from lapwing.messages.topics import COMMAND_ACKS, OPERATOR, STATUS, TRUTH
+from lapwing.services.common.ports import MotorCommand, StateEstimate
+from lapwing.services.process_table import create_all
+from lapwing.services.scene_resolver import load, resolve
 from tests.cosim.small_graph import graph_of
 
 
@@ -152,3 +159,25 @@ def test_truncated_log_packet_is_rejected(size):
 def test_log_packet_with_unknown_topic_is_rejected():
     with pytest.raises(PacketError, match=r"^log packet of "):
         unpack_log_packet(WHOLE[:16] + b"\xff\xff" + WHOLE[18:])
+
+
+def test_columns_have_order_of_row():
+    example = MotorCommand((1.0, 2.0, 3.0, 4.0), True, (5.0, 6.0, 7.0, 8.0), (9.0, 10.0, 11.0))
+    named = dict(zip(columns(example), pack_row(example), strict=True))
+    assert named["motor_voltage.2"] == 3.0
+    assert named["armed"] == 1.0
+    assert named["attitude_reference.0"] == 9.0
+    assert columns(StateEstimate())[3:7] == ["attitude.w", "attitude.x", "attitude.y", "attitude.z"]
+
+
+@pytest.mark.long
+def test_packet_length_equals_layout():
+    config = resolve(load("hover"))
+    reported = layout(config)
+    assert reported["config"] == to_json(config)
+    diagram = BlockDiagram(config, create_all(config), 64)
+    diagram.advance(26)
+    for name, service in reported["services"].items():
+        for tick in (24, 25):
+            expected = 8 * sum(len(p["columns"]) for p in service["ports"] if tick % p["period"] == 0)
+            assert len(StepPacketCodec(config.services[name].ports).pack(diagram, tick)) == expected

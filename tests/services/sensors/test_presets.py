@@ -1,4 +1,4 @@
-"""Presets of real sensors: spectrum of the readings, and values of the data sheets."""
+"""Presets of sensors, and their messages."""
 
 import math
 
@@ -7,6 +7,12 @@ import pytest
 from record import REST, record
 from scipy.signal import welch
 
+from lapwing.cosim.diagram.topic_encoder import encode
+from lapwing.kernels.row_packing import pack_row
+from lapwing.messages import stamp_ns
+from lapwing.messages import topics as topic
+from lapwing.services.process_table import create_all
+from lapwing.services.scene_resolver import load, resolve
 from lapwing.services.sensors import registry
 from lapwing.services.sensors.airspeed import PRESETS as AIRSPEEDS
 from lapwing.services.sensors.barometer import PRESETS as BAROMETERS
@@ -148,3 +154,15 @@ def test_run_command_flies_with_second_presets(tmp_path):
     values = [f"sensors.{name}.preset={part}" for name, part in parts.items()]
     sets = [part for text in (*values, "run.duration=1.0", "success.require=[]") for part in ("--set", text)]
     run_command("run", "quad_x", *sets, "--mode", "single-process", "--log", tmp_path / "a.mcap", code=0)
+
+
+@pytest.mark.parametrize("which", [topic.GPS, topic.GPS_VELOCITY], ids=["fix", "velocity"])
+def test_fix_is_stamped_with_its_moment_and_never_before_start(which):
+    config = resolve(load("delivery_mission"))
+    encoder = next(w for service in create_all(config) for w in service.encoders if w.topic is which)
+    port = config.port(encoder.port)
+    ticks = encoder.period * np.arange(4)
+    rows = np.array([pack_row(port.example._replace(age=0.2))] * len(ticks))
+    payloads = [payload.tobytes() for page in encode(encoder, port, config, ticks, rows) for payload in page.payloads]
+    stamps = [stamp_ns(which.message.decode(payload).header) for payload in payloads]
+    assert stamps == [0, 0, 0, 100_000_000]
