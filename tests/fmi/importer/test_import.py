@@ -139,13 +139,6 @@ def test_fault_is_named_with_its_time_and_log_is_complete(folder: Path, fault: i
 
 
 @pytest.mark.long
-def test_hanging_fmu_is_ended_after_its_timeout(folder: Path) -> None:
-    done = fly(scene_with(folder, start=f"fault = {HANG}", timeout=1.0), folder / "hang.mcap")
-    assert done.returncode == 1
-    assert "services.motor: small.fmu: no answer for 1 s at t = 0.500 s" in done.stderr
-
-
-@pytest.mark.long
 def test_step_longer_than_stall_is_awaited_in_multi_process_mode(folder: Path, plain_log: Path) -> None:
     """A step of 4 s; a service that reports no wait counts as stalled after 2.5 s."""
     log = folder / "slow.mcap"
@@ -285,59 +278,6 @@ def test_port_of_longer_period_is_replaced(folder: Path) -> None:
     assert done.returncode == 0, done.stderr
     samples = payloads(log, "/custom_sensor/battery_motor")
     assert [time_ns for time_ns, _ in samples] == [100_000_000 * k for k in range(11)]
-
-
-CHAIN = """
-[services.second]
-fmu = "small.fmu"
-delay = {delay}
-[services.second.inputs]
-u = "first.y"
-[services.second.outputs]
-{outputs}
-[services.first]
-fmu = "small.fmu"
-[services.first.inputs]
-u = "{source}"
-"""
-
-
-@pytest.mark.long
-def test_fmu_reads_output_of_other_fmu(folder: Path, plain_log: Path) -> None:
-    scene, log = folder / "chain.toml", folder / "chain.mcap"
-    chain = CHAIN.format(delay=0, source=COLUMN, outputs=f'"{COLUMN}" = "y"')
-    scene.write_text(HOVER.read_text() + chain)
-    done = fly(scene, log)
-    assert done.returncode == 0, done.stderr
-    assert payloads(log, "/ground_truth") == payloads(plain_log, "/ground_truth")
-    assert len(payloads(log, "/custom_sensor/fmu_first")) == 251
-
-
-@pytest.mark.long
-def test_crash_of_one_of_two_fmus_is_named_in_multi_process_mode(folder: Path) -> None:
-    scene, log = folder / "two.toml", folder / "two.mcap"
-    chain = CHAIN.format(delay=0, source=COLUMN, outputs=f'"{COLUMN}" = "y"')
-    chain = chain.replace("[services.second]", f"[services.second]\nstart = {{ fault = {CRASH} }}")
-    scene.write_text(HOVER.read_text() + chain)
-    done = run_command("run", scene, "--allow-code", "--log", log, "--set", "run.duration=1.0", code=1)
-    assert "services.second: small.fmu: crashed (SIGSEGV) at t = 0.500 s" in done.stderr
-    assert "services.first" not in done.stderr
-    assert len(payloads(log, "/ground_truth")) >= 124
-
-
-@pytest.mark.long
-@pytest.mark.parametrize("delay", [0, 1])
-def test_algebraic_loop_of_two_fmus_is_rejected(folder: Path, delay: int) -> None:
-    scene = folder / f"loop{delay}.toml"
-    scene.write_text(HOVER.read_text() + CHAIN.format(delay=delay, source="second.y", outputs=f'"{COLUMN}" = "y"'))
-    done = fly(scene, folder / f"loop{delay}.mcap")
-    if delay:
-        assert done.returncode == 0, done.stderr
-        return
-    assert done.returncode == 2
-    keys, names = "services.second.delay, services.first.delay", "first_fmu, second_fmu"
-    assert f"{keys}: an algebraic loop through {names}; expected delay = 1" in done.stderr
-    assert done.stderr.count("\n") == 1
 
 
 @pytest.mark.parametrize("kind", ["ModelExchange", "ScheduledExecution"])
