@@ -23,14 +23,8 @@ with open(os.environ["SAID"], "a") as said:
     print(json.dumps(sys.argv), file=said)
 """
 WORDS = [
-    "hover",
-    "--runs",
-    "8",
-    "--set",
-    'success.require=["outcome == \'landed\'", "rmse.z < 0.1"]',
-    "--vary",
-    "a b=$c",
-]
+    "hover", "--runs", "8", "--set", 'success.require=["outcome == \'landed\'", "rmse.z < 0.1"]', "--vary", "a b=$c",
+]  # fmt: skip
 
 
 def calls(folder, *command, **environment):

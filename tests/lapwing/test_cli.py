@@ -211,11 +211,6 @@ def test_check_prints_configuration(lapwing):
         ("--runs", "0", "--runs 0: expected a number from 1 to 10000000"),
         ("--vary", "vehicle.mass=normal(1", "expected a distribution (normal, lognormal, uniform"),
         ("--vary", "vehicle.mass", "--vary vehicle.mass: expected KEY=DISTRIBUTION"),
-        ("--design", "lsh", "--design lsh: expected one of random, lhs, sobol, grid"),
-        ("--seed", "0", "--seed 0: expected a whole number from 1"),
-        ("--shard", "3/2", "--shard 3/2: expected I/N with I from 1 to N"),
-        ("--sweep", "none.csv", "--sweep none.csv: cannot be read"),
-        ("--workers", "0", "--workers 0: expected at least 1"),
     ],
 )
 def test_campaign_checks_values_before_slow_imports(option, value, message):

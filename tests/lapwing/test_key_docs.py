@@ -97,13 +97,9 @@ def test_every_key_has_unit_or_description(table):
 
 def test_units_come_from_scene_and_airframe_schemas():
     keys = (
-        "vehicle.mass",
-        "effects.random_wind_force.sigma",
-        "airframe.motor.resistance",
-        "solver.step",
-        "run.seed",
+        "vehicle.mass", "effects.random_wind_force.sigma", "airframe.motor.resistance", "solver.step", "run.seed",
         "a.b",
-    )
+    )  # fmt: skip
     assert key_units(keys) == {
         "vehicle.mass": "kg",
         "effects.random_wind_force.sigma": "m/s",

@@ -8,17 +8,9 @@ from lapwing.services.sensors import registry
 
 def test_sensors_of_folder_are_discovered():
     assert set(registry.sensors()) == {
-        "airspeed",
-        "barometer",
-        "depth_camera",
-        "gps",
-        "imu",
-        "lidar",
-        "magnetometer",
-        "optical_flow",
-        "rangefinder",
+        "airspeed", "barometer", "depth_camera", "gps", "imu", "lidar", "magnetometer", "optical_flow", "rangefinder",
         "sonar",
-    }
+    }  # fmt: skip
 
 
 @pytest.mark.parametrize("sensor", registry.sensors())

@@ -16,23 +16,12 @@ from lapwing.services.common.schemas.vehicle_schema import airframe
 from lapwing.services.mavlink.telemetry.obstacle_distance import obstacle_distance
 from lapwing.services.scene_resolver import load, parse, reseed, resolve
 from tests.commands import run_command
+from tests.scenes import head, phase
 
-SCENE = """
-[run]
-duration = 1.0
-seed = 3
-[effects.gravity]
-[effects.rotor_thrust]
-[effects.ground_contact]
-[effects.body_drag]
-[effects.wind_constant]
-velocity = [5.0, 3.0, 0.0]
-[autopilot]
-gains = "tuned"
-estimator = "ground_truth"
-[[trajectory.phase]]
-name = "climb"
-z = { kind = "minimum_jerk", to = 1.0, duration = 1.0 }
+WIND = {"wind_constant": "velocity = [5.0, 3.0, 0.0]"}
+SCENE = (
+    (head(1.0, "body_drag", run="seed = 3", **WIND) + phase("climb", 1.0, "trajectory", z=1.0))
+    + """
 [[vehicle]]
 name = "seeing"
 airframe = "delivery_drone"
@@ -63,6 +52,7 @@ name = "ahead"
 airframe = "delivery_drone"
 initial_position = [4.0, 3.0]
 """
+)
 
 
 @pytest.fixture(scope="module")

@@ -139,15 +139,8 @@ def test_shard_option_flies_part_of_runs(complete, tmp_path):
     code, output = run_lapwing(*arguments, "--shard", "2/2")
     assert (code, "2 of 2 flights" in output, "3 shards missing" in output) == (0, True, True)
     run_arguments = [
-        "run",
-        "hover",
-        "--set",
-        "run.duration=0.5",
-        "--campaign",
-        tmp_path / "c",
-        "--mode",
-        "single-process",
-    ]
+        "run", "hover", "--set", "run.duration=0.5", "--campaign", tmp_path / "c", "--mode", "single-process",
+    ]  # fmt: skip
     reported = {run: run_lapwing(*run_arguments, "--run", run, "--log", tmp_path / "again.mcap")[1] for run in (0, 1)}
     assert f"run 0 of {tmp_path / 'c'}: not recorded in the campaign yet" in reported[0]
     assert f"run 1 of {tmp_path / 'c'}: final state bit-for-bit identical" in reported[1]

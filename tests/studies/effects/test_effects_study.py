@@ -23,6 +23,7 @@ from lapwing.views.studies import effects_result
 from lapwing.views.studies.study_result import show, write_json, write_plot
 from lapwing.views.terminal import console
 from tests.commands import run_command
+from tests.scenes import head, phase, vehicle
 
 SCENES = Path(__file__).parents[3] / "lapwing/scenes"
 HOVER = SCENES / "hover.toml"
@@ -186,33 +187,10 @@ def test_options_of_effects_are_studied(table, active):
     assert set(result.smallest) <= set(scene[Effects].tables)
 
 
-STACKED = """  # without downwash, the effects of the scene `fleet`
-[run]
-duration = 2.5
-[effects.gravity]
-[effects.rotor_thrust]
-[effects.ground_contact]
-[effects.body_drag]
-[effects.wind_constant]
-velocity = [0.0, 0.0, 0.0]
-[effects.downwash]
-[autopilot]
-gains = "tuned"
-estimator = "ground_truth"
-[[vehicle]]
-name = "upper"
-airframe = "delivery_drone"
-[[vehicle.trajectory.phase]]
-name = "climb"
-z = { kind = "minimum_jerk", to = 3.0, duration = 2.0 }
-[[vehicle]]
-name = "lower"
-airframe = "delivery_drone"
-initial_position = [0.0, 0.0]
-[[vehicle.trajectory.phase]]
-name = "climb"
-z = { kind = "minimum_jerk", to = 1.0, duration = 2.0 }
-"""
+CALM = {"wind_constant": "velocity = [0.0, 0.0, 0.0]"}
+STACKED = head(2.5, "body_drag", "downwash", **CALM) + "".join(  # without downwash, the effects of the scene `fleet`
+    vehicle(name, phase("climb", 2.0, z=height)) for name, height in (("upper", 3.0), ("lower", 1.0))
+)
 
 
 @pytest.mark.long

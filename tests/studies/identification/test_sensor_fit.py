@@ -107,17 +107,9 @@ def test_command_writes_tables_that_scene_takes(tmp_path):
 
     scene = "delivery_mission"
     flights = run(
-        "run",
-        scene,
-        "--mode",
-        "single-process",
-        "--log",
-        "f.mcap",
-        "--set",
-        "run.duration=12",
-        "--set",
+        "run", scene, "--mode", "single-process", "--log", "f.mcap", "--set", "run.duration=12", "--set",
         "success.require=[]",
-    )
+    )  # fmt: skip
     assert flights.returncode == 0, flights.stderr
     done = run("identify", scene, "f.mcap", "--sensors", "--out", "sensors.toml")
     assert done.returncode == 0, done.stderr
