@@ -7,6 +7,7 @@ import pytest
 from lapwing.runs.multi_process_run import Clock
 from lapwing.runs.observer import Elapsed, Silent
 from lapwing.services.scene_resolver import load, resolve
+from tests.commands import assert_rejected
 
 
 def test_protocol_lists_services_ports_and_columns(lapwing):
@@ -23,10 +24,7 @@ def test_json_and_picture_are_written(lapwing, tmp_path):
 
 
 def test_missing_folder_is_one_line(lapwing):
-    code, _, err = lapwing("protocol", "hover", "--plot", "none/p.png")
-    assert code == 2
-    assert err.count("\n") == 1
-    assert "none/p.png: cannot be written" in err
+    assert_rejected(lapwing("protocol", "hover", "--plot", "none/p.png"), "none/p.png: cannot be written")
 
 
 @pytest.mark.parametrize("kind", ["scene", "airframe", "gains"])
@@ -47,11 +45,7 @@ def test_schema_is_json(lapwing, tmp_path, kind):
     ],
 )
 def test_schema_rejects_bad_arguments_in_one_line(lapwing, arguments, message):
-    code, out, err = lapwing("schema", *arguments)
-    assert (code, out) == (2, "")
-    assert err.startswith("lapwing: ")
-    assert err.count("\n") == 1
-    assert message in err
+    assert_rejected(lapwing("schema", *arguments), message)
 
 
 @pytest.mark.parametrize(

@@ -13,7 +13,7 @@ import pytest
 import lapwing as package
 from lapwing.views.view3d import headless
 from lapwing.views.view3d.render import Shot, write_film
-from tests.commands import run_command
+from tests.commands import assert_rejected, run_command
 
 pytest.importorskip("viser", reason="needs viser (pip install lapwing[view3d])")
 SMALL = ("--size", "160x120")
@@ -52,9 +52,10 @@ def test_render_rejects_wrong_options_in_one_line(log, tmp_path, words, message)
 
 def test_film_without_encoder_is_rejected_in_one_line(lapwing, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    code, _, err = lapwing("render", tmp_path / "none.mcap", "--out", tmp_path / "a.mp4")
-    assert (code, err.count("\n")) == (2, 1)
-    assert "a.mp4: needs the encoder of imageio-ffmpeg; pip install lapwing[view3d], or write .webp" in err
+    assert_rejected(
+        lapwing("render", tmp_path / "none.mcap", "--out", tmp_path / "a.mp4"),
+        "a.mp4: needs the encoder of imageio-ffmpeg; pip install lapwing[view3d], or write .webp",
+    )
 
 
 @pytest.mark.skipif(headless.PROGRAM is None, reason="needs Chromium")
