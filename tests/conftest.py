@@ -17,7 +17,7 @@ SLOWEST = (  # minutes each
     "test_exact_arithmetic.py",
     "test_scenes.py",
     "test_propeller_failures.py",
-    "test_stress.py",
+    "test_faults.py",
     "test_library.py",
     "test_options.py",
     "test_compose.py",

@@ -22,6 +22,7 @@ from lapwing.services import process_table as processes
 from lapwing.services import security
 from lapwing.services.common.firmware.schema import FIRMWARES
 from lapwing.services.scene_resolver import load, resolve
+from tests.commands import run_command
 from tests.services.foxglove.client import patient
 
 pytestmark = pytest.mark.long
@@ -303,7 +304,5 @@ def test_firmware_profile_flies_mounted_program(firmware, program, skipped, ends
     service = compose(SCENE=f"{firmware}_quad", LOG=str(tmp_path / "flight.mcap"))[firmware]
     command = [part.replace(f"/opt/{firmware}", str(tmp_path)) for part in service["command"][1:]]
     short = ["--set", "run.duration=15.0"] if firmware == "ardupilot" else []
-    done = subprocess.run(
-        [sys.executable, "-m", "lapwing", *command, *short], capture_output=True, text=True, timeout=900, check=False
-    )
+    done = run_command(*command, *short)
     assert ends in done.stdout, done.stdout + done.stderr

@@ -3,8 +3,6 @@
 import os
 import re
 import shlex
-import subprocess
-import sys
 from concurrent.futures import Future, ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
@@ -13,6 +11,7 @@ import pytest
 
 from lapwing.views.view3d import headless
 from tests.combinations import NIGHTLY
+from tests.commands import run_command
 
 pytestmark = pytest.mark.long
 
@@ -72,8 +71,7 @@ def _run(command, key_prefix, folder, before):
     words = shlex.split(command)[1:]
     own = ["--key-prefix", key_prefix]
     more = {"run": own, "replay": own, "render": ["--fps", "1"], "effects": ["--only", "air_density"]}.get(words[0], [])
-    program = [sys.executable, "-m", "lapwing", *words, *more]
-    return subprocess.run(program, cwd=folder, capture_output=True, text=True, timeout=1800)
+    return run_command(*words, *more, folder=folder)
 
 
 @pytest.mark.parametrize(

@@ -19,14 +19,9 @@ from tests.golden.cases import CASES
 ROOT = Path(__file__).parents[2]
 MODULE = "tests.contracts.test_exact_arithmetic"
 FOLDERS = (
-    "lapwing/cosim/config",
-    "lapwing/cosim/diagram",
-    "lapwing/cosim/executors",
-    "lapwing/dynamics",
-    "lapwing/kernels",
-    "messages",
-    "services",
-)
+    "lapwing/cosim/config", "lapwing/cosim/diagram", "lapwing/cosim/executors", "lapwing/dynamics", "lapwing/kernels",
+    "messages", "services",
+)  # fmt: skip
 EXEMPT = {
     "lapwing/dynamics/multibody/simulation.py": "energies of the accuracy study",
     "lapwing/dynamics/vehicles/performance.py": "performance card",

@@ -1,15 +1,13 @@
 """Every option of every command is used by a test that runs the command as a process."""
 
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
 import typer
 
 from lapwing.cli.main import app
+from tests.commands import run_command
 
 SHORT = "--set run.duration=0.2 --set success.require=[]"
 GYROSTAT = Path("lapwing/scenes/gyrostat_blocked.toml").resolve()  # without a path, it names an accuracy problem
@@ -93,7 +91,7 @@ ELSEWHERE = {  # other tests by option; a test's file contains the option
         "--external": "tests/examples/test_rust_controller.py",
         "--keys": "tests/cosim/test_join.py",
         "--view": "tests/lapwing/test_live.py",
-        "--realtime": "tests/cosim/executors/test_deadlines.py",
+        "--realtime": "tests/cosim/executors/test_lockstep.py",
     },
     "service": {
         "--set": "tests/lapwing/test_joined.py",
@@ -109,7 +107,7 @@ ELSEWHERE = {  # other tests by option; a test's file contains the option
         "--ros2": "tests/services/ros2/test_service.py",
         "--ros2-router": "tests/services/ros2/test_service.py",
     },
-    "effects": {"--list": "tests/lapwing/test_descriptions.py::test_list_has_every_effect_and_key"},
+    "effects": {"--list": "tests/lapwing/test_key_docs.py::test_list_has_every_effect_and_key"},
     "test": dict.fromkeys(("--junit", "--keep"), "tests/lapwing/test_scene_tests.py"),
     "check": {"--allow-code": "tests/fmi/importer/test_import.py"},
     "campaign": {
@@ -166,10 +164,7 @@ def folder(tmp_path_factory):
 def test_command_runs_with_its_options(folder, name):
     if name == "recover":
         (folder / "cut.mcap").write_bytes((folder / "a.mcap").read_bytes()[:-500])
-    command = [sys.executable, "-m", "lapwing", *COMMANDS[name].split()]
-    environment = os.environ | {"PYTHONPATH": str(Path.cwd())}
-    result = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=False)
-    assert result.returncode == 0, result.stderr
+    result = run_command(*COMMANDS[name].split(), code=0, folder=folder)
     assert "Traceback" not in result.stderr
 
 

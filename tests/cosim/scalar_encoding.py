@@ -57,21 +57,12 @@ def diagonal(x, y, z):
 
 def truth(given, time_ns, x):
     return VehicleState(
-        header(time_ns, "world"),
-        pose_of(x.position_world, x.attitude),
-        Vector3(*x.velocity_world),
-        Vector3(*x.omega_body),
-        Vector3(*x.acceleration_world),
-        rotor_speed=x.rotor_speed,
-        motor_voltage=x.motor_voltage,
-        motor_current=x.motor_current,
-        motor_power=x.motor_power,
-        rotor_thrust=x.rotor_thrust,
-        rotor_torque=x.rotor_torque,
-        wind=Vector3(*x.wind_world),
-        air_density=x.air_density,
-        ground_contact=x.ground_contact,
-    )
+        header(time_ns, "world"), pose_of(x.position_world, x.attitude), Vector3(*x.velocity_world),
+        Vector3(*x.omega_body), Vector3(*x.acceleration_world), rotor_speed=x.rotor_speed,
+        motor_voltage=x.motor_voltage, motor_current=x.motor_current, motor_power=x.motor_power,
+        rotor_thrust=x.rotor_thrust, rotor_torque=x.rotor_torque, wind=Vector3(*x.wind_world),
+        air_density=x.air_density, ground_contact=x.ground_contact,
+    )  # fmt: skip
 
 
 def pose(given, time_ns, x):

@@ -6,8 +6,6 @@
 import multiprocessing
 import threading
 
-import pytest
-
 from lapwing.cosim.access.private_sockets import private_endpoints
 from lapwing.cosim.transport.bus import ZenohBus
 from tests.endpoints import absent
@@ -58,11 +56,6 @@ def lost(waits):
         count = results.get(timeout=120.0)
         receiver.join()
     return MESSAGES - count
-
-
-def test_zenoh_close_loses_queued_messages():
-    if not any(lost(waits=False) for _ in range(5)):
-        pytest.skip("this machine was quick enough: nothing was queued at the close")
 
 
 def test_confirmation_covers_all_earlier_messages():

@@ -16,6 +16,7 @@ from mcap.writer import MCAP0_MAGIC
 import lapwing
 from lapwing.cosim.log import LogReader, mcap_contents
 from lapwing.cosim.log.mcap_writer import encode
+from tests.commands import run_command
 
 MESSAGE = encode(Message(channel_id=1, data=b"hello", log_time=5, publish_time=5, sequence=0))
 LARGEST = 1 << 20  # [bytes], 1/256 of the default
@@ -79,10 +80,7 @@ def write_many(path, count, size):
 def test_command_rejects_log_that_unpacks_beyond_limit(command, tmp_path):
     log = write_many(tmp_path / "bomb.mcap", 40, 64 << 20)  # 2.7 GB from 100 kB
     name, *options = command
-    call = [sys.executable, "-m", "lapwing", name, str(log), *options]
-    environment = os.environ | {"PYTHONPATH": os.getcwd()}
-    result = subprocess.run(call, cwd=tmp_path, env=environment, capture_output=True, text=True, check=False)
-    assert result.returncode == 2
+    result = run_command(name, log, *options, code=2, folder=tmp_path)
     assert re.fullmatch(
         r"lapwing: .*bomb\.mcap: its chunks unpack to over \d+ MB; expected at most 200 times .*\n", result.stderr
     )

@@ -20,6 +20,7 @@ from lapwing.messages.digest import Digest
 from lapwing.messages.topics import CLOCK
 from lapwing.services.replay import player
 from lapwing.services.replay.playback_timing import Cut, Pace, schedule
+from tests.commands import assert_rejected, run_command
 from tests.endpoints import loopback_endpoints
 
 pytestmark = pytest.mark.long
@@ -136,17 +137,7 @@ def test_unreplayable_log_is_rejected_in_single_line(log, arguments, output):
     arguments = [str(log) if a == "LOG" else a for a in arguments]
     (endpoint,) = loopback_endpoints(["a"]).values()
     values = [] if "--listen" in arguments else ["--listen", endpoint]
-    result = subprocess.run(
-        replay(*arguments, *values, "--key-prefix", "test-error"),
-        capture_output=True,
-        text=True,
-        timeout=PATIENCE,
-        check=False,
-    )
-    assert result.returncode == 2
-    assert result.stderr.startswith("lapwing: ")
-    assert result.stderr.count("\n") == 1
-    assert output in result.stderr
+    assert_rejected(run_command("replay", *arguments, *values, "--key-prefix", "test-error"), output)
 
 
 def test_equal_times_keep_their_order_through_three_generations(tmp_path, monkeypatch):

@@ -4,7 +4,6 @@ import json
 import os
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +11,7 @@ import pytest
 from lapwing.api.flight import Flight
 from lapwing.runs.resimulate import resimulate
 from tests.combinations import NIGHTLY
+from tests.commands import run_command
 from tests.endpoints import loopback_endpoints
 
 pytestmark = [pytest.mark.long, NIGHTLY]
@@ -34,17 +34,13 @@ def program():
     return Path(os.environ.get("CARGO_TARGET_DIR", CRATE / "target")) / "debug" / "rust_controller"
 
 
-def lapwing(*arguments):
-    return subprocess.run([sys.executable, "-m", "lapwing", *arguments], capture_output=True, text=True, timeout=300)
-
-
 def fly(program, tmp_path, log, *more):
     layout, (endpoint,) = tmp_path / "layout.json", loopback_endpoints(["autopilot"]).values()
-    assert lapwing("protocol", SCENE, *SHORT, "--json", str(layout)).returncode == 0
+    run_command("protocol", SCENE, *SHORT, "--json", layout, code=0)
     own = subprocess.Popen([program, layout, endpoint, "test-rust"])
     try:
         where = ["--external", f"autopilot={endpoint}", "--insecure", "--key-prefix", "test-rust", "--log", str(log)]
-        return lapwing("run", SCENE, *SHORT, *where, "--json", str(log.with_suffix(".json")), *more), own.wait(120)
+        return run_command("run", SCENE, *SHORT, *where, "--json", log.with_suffix(".json"), *more), own.wait(120)
     finally:
         own.kill()
 

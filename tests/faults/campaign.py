@@ -12,6 +12,7 @@ from functools import cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
+from tests.commands import run_command
 from tests.faults import leak_checks
 
 KILL, WORKER, INTERRUPT = "campaign kill", "campaign worker", "campaign Ctrl-C"
@@ -102,8 +103,7 @@ def _continues(command: list[str], environment: dict[str, str], out: Path) -> li
 def undisturbed() -> str:
     """Return the digest of a campaign without a fault."""
     with TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "lapwing", *COMMAND, "--out", f"{folder}/out"]
-        flight = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True, timeout=LONGEST)
+        flight = run_command(*COMMAND, "--out", f"{folder}/out", code=0, folder=ROOT)
         return _digest(flight.stdout)
 
 

@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from tests.commands import run_command
 from tests.faults import leak_checks
 
 ROOT = Path(__file__).parents[2]
@@ -106,9 +107,7 @@ def ended_properly(done: "subprocess.CompletedProcess[str]") -> list[str]:
 @cache
 def _digest() -> str:
     with tempfile.TemporaryDirectory() as folder:
-        command = [sys.executable, "-m", "lapwing", *RUN]
-        environment = {**os.environ, "PYTHONPATH": str(ROOT)}
-        done = subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, check=True)
+        done = run_command(*RUN, code=0, folder=folder)
     result = re.search(r"^digest +(\w+)$", done.stdout, re.MULTILINE)
     assert result, done.stdout
     return result[1]

@@ -26,6 +26,7 @@ from typing import NamedTuple
 
 from pymavlink import mavutil
 
+from tests.commands import run_command
 from tests.faults import leak_checks
 
 PAGE = resource.getpagesize()  # [B]
@@ -108,8 +109,7 @@ def fly(scene: list[str], endpoint: str, count: list[int]) -> Flight:
         wrong = leak_checks.left(folder, taken, None, 10.0)
         if flight.returncode:
             return Flight(use, 0, 0, [*wrong, f"exit code {flight.returncode}: {report[-300:]}"])
-        again = [sys.executable, "-m", "lapwing", "resimulate", log]
-        done = subprocess.run(again, capture_output=True, text=True)
+        done = run_command("resimulate", log)
         wrong += [f"resimulate: {done.stderr[-300:]}"] if done.returncode else []
         lag = BEHIND.search(report)
         wrong += [] if lag else ["no report of the telemetry"]

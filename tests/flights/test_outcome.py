@@ -74,20 +74,6 @@ def test_vehicle_that_slides_without_takeoff_never_left_the_ground(finished):
     assert (outcome.kind, outcome.how, outcome.mark) == ("timed out", "never left the ground", "warn")
 
 
-@pytest.mark.parametrize(
-    ("mission", "armed", "kind", "reason"),
-    [
-        (None, False, "completed", ": no mission, the motors were never armed"),
-        (Mission(None), False, "timed out", ": the motors were never armed"),
-        (Mission(None, is_longer=True), T > 4.5, "completed", ": the run ends before its trajectory"),
-        (Mission(None, is_longer=True), T > 1.0, "timed out", ""),  # the motors ran, and the vehicle stayed
-    ],
-)
-def test_flight_that_never_left_the_ground_is_not_good(mission, armed, kind, reason):
-    outcome = fly(mission, finished=False, ground_contact=True, status={"armed": armed})
-    assert (outcome.kind, outcome.how, outcome.mark) == (kind, f"never left the ground{reason}", "warn")
-
-
 def test_blockers_of_arming_are_reasons_to_stay_on_the_ground():
     blockers = np.empty(TICKS, object)
     blockers[:] = [("the vehicle is not level", "the battery is low: 3%")] * TICKS
@@ -284,12 +270,3 @@ def test_mission_target_is_end_of_trajectory():
     )
     assert target.target[:2] == (0.0, 0.0)
     assert not target.is_longer
-
-
-@pytest.mark.long
-def test_gps_loss_ends_in_failsafe_and_fails_by_default():
-    overrides = {"sensors.gps.faults": [{"kind": "dropout", "start": 5.0}]}
-    flight = lapwing.fly("delivery_mission", overrides)
-    assert flight.outcome.kind == "ended in failsafe"
-    assert flight.outcome.failsafe_time > 5.0
-    assert flight.outcome.target_distance > 1.0

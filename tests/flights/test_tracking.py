@@ -1,10 +1,13 @@
-"""Errors of known offsets."""
+"""Tracking errors, separation of vehicles, and reproduction of results."""
 
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from lapwing.cosim.config import provenance
 from lapwing.flights import tracking
+from lapwing.flights.logs import log_comparison
+from lapwing.flights.separation import least_over_time, nearest
 
 
 def test_roll_pitch_yaw_equal_scipy():
@@ -41,3 +44,51 @@ def test_yaw_is_continuous_over_half_turn():
     xyzw = np.column_stack([np.zeros((50, 2)), np.sin(0.5 * yaw), np.cos(0.5 * yaw)])
     assert tracking.roll_pitch_yaw(xyzw)[:, 2] == pytest.approx(yaw)
     assert tracking.roll_pitch_yaw(xyzw[:17])[:, 2] == pytest.approx(yaw[:17])  # no jump
+
+
+class Truth:
+    """Return a straight path."""
+
+    def __init__(self, start, velocity, n=11):
+        self.times = np.arange(n) * 0.1
+        self.position = np.array(start) + self.times[:, None] * np.array(velocity)
+
+    def __len__(self):
+        return len(self.times)
+
+
+def test_passing_vehicles_are_nearest_side_by_side():
+    truths = {
+        "a": Truth((0.0, 0.0, 0.0), (2.0, 0.0, 0.0)),
+        "b": Truth((1.0, 3.0, 0.0), (0.0, 0.0, 0.0)),
+        "far": Truth((0.0, 90.0, 0.0), (0.0, 0.0, 0.0), n=6),  # shorter log
+    }
+    result = nearest(truths)
+    assert (result.vehicles, result.distance, result.time) == (("a", "b"), pytest.approx(3.0), pytest.approx(0.5))
+    assert str(result) == "Nearest: a and b, 3.00 m apart at 0.50 s"
+    assert least_over_time(truths) == pytest.approx(np.hypot(3.0, 1.0 - 2.0 * np.arange(6) * 0.1))
+
+
+RECORDED = {"commit": "abc", "mode": "single-process"}
+
+
+@pytest.mark.parametrize(
+    ("metadata", "here", "beginning"),
+    [
+        (RECORDED, "abc", "equal"),
+        (RECORDED, "def", "not certain"),
+        (RECORDED, "abc+", "unknown"),
+        ({"mode": "single-process"}, "abc", "unknown"),
+        ({**RECORDED, "mode": "imported"}, "abc", "imported"),
+    ],
+)
+def test_expectation_follows_from_commits(monkeypatch, metadata, here, beginning):
+    monkeypatch.setattr(log_comparison, "source_commit", lambda: here)
+    assert log_comparison.expectation(metadata).startswith(beginning)
+
+
+def test_facts_name_this_machine():
+    facts = {fact.name: fact for fact in log_comparison.facts({**provenance.machine(), "processor": "armv9"})}
+    assert facts["python"].recorded == facts["python"].here
+    assert facts["processor"].recorded != facts["processor"].here
+    assert facts["commit"].recorded == "unknown"

@@ -1,8 +1,6 @@
 """Scenes with FMUs of their own, exported as packages (SSP), FMUs and libraries."""
 
 import re
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 from xml.etree import ElementTree as Xml
@@ -14,6 +12,8 @@ from small_fmu import write_small_fmu
 
 fmpy = pytest.importorskip("fmpy")
 from lxml import etree  # noqa: E402
+
+from tests.commands import assert_rejected, run_command  # noqa: E402
 
 pytestmark = pytest.mark.long
 
@@ -56,22 +56,9 @@ NAMES = {
 }
 
 
-def run_command(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", "lapwing", *arguments], capture_output=True, text=True, check=False)
-
-
 def digest(scene: Path, *options: str) -> str:
-    done = run_command(
-        "run",
-        str(scene),
-        "--allow-code",
-        "--mode",
-        "single-process",
-        "--log",
-        str(scene.with_suffix(".mcap")),
-        *options,
-    )
-    assert done.returncode == 0, done.stderr
+    log = scene.with_suffix(".mcap")
+    done = run_command("run", scene, "--allow-code", "--mode", "single-process", "--log", log, *options, code=0)
     result = re.search(r"digest\s+(\w+)", done.stdout)
     assert result
     return result[1]
@@ -83,8 +70,7 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_effect_fmu(path / "parts.fmu")
     write_small_fmu(path / "small.fmu", unit_u="ft", unit_y="ft")
     (path / "scene.toml").write_text(HOVER.read_text() + SCENE)
-    done = run_command("export-ssp", str(path / "scene.toml"), "--allow-code", "--out", str(path / "a.ssp"), *OPTIONS)
-    assert done.returncode == 0, done.stderr
+    done = run_command("export-ssp", path / "scene.toml", "--allow-code", "--out", path / "a.ssp", *OPTIONS, code=0)
     assert "plant, trajectory, autopilot, pack, sense, motor" in done.stdout
     return path
 
@@ -115,8 +101,7 @@ def test_package_without_fmu_flies_without_it(folder: Path) -> None:
         for name in source.namelist():
             if name != "resources/pack.fmu":
                 archive.writestr(name, Xml.tostring(root) if name.endswith(".ssd") else source.read(name))
-    done = run_command("check", str(package))
-    assert done.returncode == 0, done.stderr
+    done = run_command("check", package, code=0)
     assert "pack_fmu" not in done.stdout
     assert "motor_fmu" in done.stdout
 
@@ -149,10 +134,10 @@ def test_connections_have_sources_and_factors(folder: Path) -> None:
 @pytest.mark.parametrize("command", ["export-ssp", "export-fmu", "export-library"])
 def test_export_needs_permission_for_fmus(folder: Path, command: str) -> None:
     out = folder / {"export-ssp": "x.ssp", "export-fmu": "x.fmu", "export-library": "x"}[command]
-    done = run_command(command, str(folder / "scene.toml"), "--out", str(out), *OPTIONS)
-    assert done.returncode == 2
-    assert "an FMU contains machine code; if you trust its author, use --allow-code to run it" in done.stderr
-    assert done.stderr.count("\n") == 1
+    assert_rejected(
+        run_command(command, folder / "scene.toml", "--out", out, *OPTIONS),
+        "an FMU contains machine code; if you trust its author, use --allow-code to run it",
+    )
     assert not out.is_file()
 
 
@@ -160,8 +145,7 @@ def test_export_needs_permission_for_fmus(folder: Path, command: str) -> None:
 def test_plant_with_permission_is_exported(folder: Path, command: str) -> None:
     """The plant has the named input of its battery."""
     out = folder / {"export-fmu": "plant.fmu", "export-library": "plant"}[command]
-    done = run_command(command, str(folder / "scene.toml"), "--allow-code", "--out", str(out), *OPTIONS)
-    assert done.returncode == 0, done.stderr
+    done = run_command(command, folder / "scene.toml", "--allow-code", "--out", out, *OPTIONS, code=0)
     if command == "export-fmu":
         assert "inputs actuators, status, effect.battery" in done.stdout
 
@@ -176,9 +160,9 @@ def test_fmus_that_package_cannot_have_are_named(tmp_path: Path) -> None:
         ("2", "is an FMU of FMI 3.0, which SSP 1.0 does not support; use --fmi 3"),
         ("3", "u[0] is an element"),
     ):
-        done = run_command("export-ssp", str(scene), "--allow-code", "--fmi", fmi, "--out", str(tmp_path / "a.ssp"))
-        assert done.returncode == 2
-        assert "services.ball: " in done.stderr
-        assert message in done.stderr
-        assert done.stderr.count("\n") == 1
+        assert_rejected(
+            run_command("export-ssp", scene, "--allow-code", "--fmi", fmi, "--out", tmp_path / "a.ssp"),
+            "services.ball: ",
+            message,
+        )
         assert not (tmp_path / "a.ssp").exists()

@@ -3,7 +3,6 @@ import math
 import random
 import shutil
 import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +14,7 @@ from lapwing.fmi.export.library import export_library
 from lapwing.fmi.export.native_build import NATIVE, compiler
 from lapwing.kernels.row_packing import row_width
 from tests.combinations import NIGHTLY, rest_nightly
+from tests.commands import assert_rejected, run_command
 
 pytestmark = pytest.mark.long
 
@@ -80,10 +80,7 @@ def hover(tmp_path_factory: pytest.TempPathFactory) -> tuple[NativePart, Recorde
 
 def test_command_exports_library_with_recorded_bits(tmp_path: Path) -> None:
     arguments = ["hover", "--part", "plant", "--cpu", "x86-64-v2", "--out", str(tmp_path), "--set", "run.duration=2.0"]
-    done = subprocess.run(
-        [sys.executable, "-m", "lapwing", "export-library", *arguments], capture_output=True, text=True, check=False
-    )
-    assert done.returncode == 0, done.stderr
+    run_command("export-library", *arguments, code=0)
     config = scene_config("hover", **{"run.duration": 2.0})
     native, recorded = NativePart(tmp_path, "hover_plant", export_part(config, "plant")), RecordedPorts(config)
     native.compare(recorded, 0, recorded.ticks)
@@ -247,13 +244,7 @@ def test_native_frexp_equals_that_of_python(tmp_path: Path) -> None:
 )
 def test_invalid_export_is_rejected_in_one_line(arguments: list[str], message: str, tmp_path: Path) -> None:
     out = tmp_path / "lib"
-    done = subprocess.run(
-        [sys.executable, "-m", "lapwing", "export-library", *arguments, "--out", str(out)],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert done.stderr.count("\n") == 1
+    assert_rejected(run_command("export-library", *arguments, "--out", out), message)  # fmt: skip
     assert not out.exists() or not any(out.iterdir())
 
 

@@ -1,7 +1,5 @@
 """Exported plants whose propellers fail in flight (`[multibody.event]`): the failures have the bits of the run."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +16,7 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.fmi.export.exported_part import export_part
 from lapwing.fmi.export.fmu import export_fmu
 from tests.combinations import NIGHTLY, rest_nightly
+from tests.commands import run_command
 
 pytestmark = pytest.mark.long
 LOCKED, FREE = '{time=2.601, propeller=2, failure="locked"}', '{time=2.602, propeller=1, failure="free"}'
@@ -38,9 +37,7 @@ def vehicle(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """FMI 3.0, from the command."""
     path = tmp_path_factory.mktemp("fmu") / "vehicle.fmu"
     settings = [f"--set={key}={value}" for key, value in {**SCENE, "multibody.event": FAILURES}.items()]
-    command = [sys.executable, "-m", "lapwing", "export-fmu", "delivery_mission", "--part", "vehicle", *settings]
-    done = subprocess.run([*command, "--out", str(path)], capture_output=True, text=True, check=False)
-    assert done.returncode == 0, done.stderr
+    run_command("export-fmu", "delivery_mission", "--part", "vehicle", *settings, "--out", path, code=0)
     assert validate_fmu(str(path)) == []
     return path
 

@@ -1,5 +1,3 @@
-import subprocess
-import sys
 import zipfile
 from pathlib import Path
 from xml.etree import ElementTree as Xml
@@ -12,15 +10,13 @@ pytest.importorskip("fmpy")
 
 from fmpy.ssp.ssd import read_ssd
 
+from tests.commands import assert_rejected, run_command
+
 pytestmark = pytest.mark.long
 
 STRUCTURE = "SystemStructure.ssd"
 NOTE = '<ssc:Annotation type="org.lapwing.part">'
 HOVER = ("--mode", "single-process", "--set", "run.duration=3.0", "--set", "success.require=[]")
-
-
-def run_command(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", "lapwing", *arguments], capture_output=True, text=True, check=False)
 
 
 def truth(log: Path) -> list[bytes]:
@@ -57,28 +53,24 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     path = tmp_path_factory.mktemp("ssp")
     for fmi in (2, 3):
         options = ("--fmi", str(fmi), "--cpu", "x86-64-v3", "--set", "run.duration=3.0", "--set", "success.require=[]")
-        done = run_command("export-ssp", "hover", "--out", str(path / f"hover{fmi}.ssp"), *options)
-        assert done.returncode == 0, done.stderr
+        done = run_command("export-ssp", "hover", "--out", path / f"hover{fmi}.ssp", *options, code=0)
         assert f"SSP {fmi - 1}.0" in done.stdout
         assert "plant, trajectory, autopilot" in done.stdout
-    done = run_command("run", "hover", "--log", str(path / "plain.mcap"), *HOVER)
-    assert done.returncode == 0, done.stderr
+    done = run_command("run", "hover", "--log", path / "plain.mcap", *HOVER, code=0)
     return path
 
 
 @pytest.mark.parametrize("fmi", [2, 3])
 def test_exported_package_flies_with_bits_of_scene(folder: Path, fmi: int) -> None:
     log = folder / f"native{fmi}.mcap"
-    done = run_command("run", str(folder / f"hover{fmi}.ssp"), "--log", str(log), "--mode", "single-process")
-    assert done.returncode == 0, done.stderr
+    run_command("run", folder / f"hover{fmi}.ssp", "--log", log, "--mode", "single-process", code=0)
     assert truth(log) == truth(folder / "plain.mcap")
 
 
 def test_override_applies_to_package(folder: Path) -> None:
     log = folder / "short.mcap"
     options = ("--mode", "single-process", "--set", "run.duration=1.0")
-    done = run_command("run", str(folder / "hover3.ssp"), "--log", str(log), *options)
-    assert done.returncode == 0, done.stderr
+    run_command("run", folder / "hover3.ssp", "--log", log, *options, code=0)
     assert len(truth(log)) == 251
 
 
@@ -86,17 +78,12 @@ def test_override_applies_to_package(folder: Path) -> None:
 def test_fmu_in_package_takes_place_of_part(folder: Path, fmi: int) -> None:
     package = changed(folder / f"hover{fmi}.ssp", folder / f"foreign{fmi}.ssp", foreign("autopilot"))
     log = folder / f"foreign{fmi}.mcap"
-    done = run_command("run", str(package), "--log", str(log), "--mode", "single-process")
-    assert done.returncode == 2
+    done = run_command("run", package, "--log", log, "--mode", "single-process", code=2)
     assert "services.autopilot: an FMU contains machine code" in done.stderr
     ports = 'services.autopilot.outputs={"actuators.armed"="actuators.armed"}'
-    done = run_command(
-        "run", str(package), "--log", str(log), "--allow-code", "--mode", "single-process", "--set", ports
-    )
-    assert done.returncode == 0, done.stderr
+    done = run_command("run", package, "--log", log, "--allow-code", "--mode", "single-process", "--set", ports, code=0)
     assert truth(log) == truth(folder / "plain.mcap")
-    done = run_command("resimulate", str(log), "--allow-code")
-    assert done.returncode == 0, done.stderr
+    done = run_command("resimulate", log, "--allow-code", code=0)
 
 
 def nested(package: Path, out: Path) -> Path:
@@ -128,12 +115,10 @@ def nested(package: Path, out: Path) -> Path:
 def test_system_in_system_flies_like_flat_one(folder: Path, tmp_path: Path) -> None:
     flat = changed(folder / "hover3.ssp", tmp_path / "flat.ssp", foreign("autopilot"))
     package, log = nested(flat, tmp_path / "nested.ssp"), tmp_path / "nested.mcap"
-    done = run_command("run", str(package), "--log", str(log), *HOVER)
-    assert done.returncode == 2
+    done = run_command("run", package, "--log", log, *HOVER, code=2)
     assert "services.control_pilot: an FMU contains machine code" in done.stderr
     ports = 'services.control_pilot.outputs={"actuators.armed"="actuators.armed"}'
-    done = run_command("run", str(package), "--allow-code", "--log", str(log), *HOVER, "--set", ports)
-    assert done.returncode == 0, done.stderr
+    done = run_command("run", package, "--allow-code", "--log", log, *HOVER, "--set", ports, code=0)
     assert truth(log) == truth(folder / "plain.mcap")
 
 
@@ -192,10 +177,7 @@ def test_fmpy_flies_package(folder: Path) -> None:
 )
 def test_invalid_package_is_one_line(folder: Path, tmp_path: Path, changes: list, message: str) -> None:
     package = changed(folder / "hover3.ssp", tmp_path / "bad.ssp", *changes)
-    done = run_command("run", str(package), "--allow-code", "--log", str(tmp_path / "a.mcap"), *HOVER)
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert done.stderr.count("\n") == 1
+    assert_rejected(run_command("run", package, "--allow-code", "--log", tmp_path / "a.mcap", *HOVER), message)
     assert not (tmp_path / "a.mcap").exists()
 
 
@@ -203,13 +185,10 @@ def test_damaged_package_is_one_line(folder: Path, tmp_path: Path) -> None:
     path = tmp_path / "bad.ssp"
     for content, message in ((b"no archive", "not a package"), (b"", "not a package")):
         path.write_bytes(content)
-        done = run_command("run", str(path), "--log", str(tmp_path / "a.mcap"))
-        assert done.returncode == 2
-        assert message in done.stderr
-        assert done.stderr.count("\n") == 1
+        done = run_command("run", path, "--log", tmp_path / "a.mcap")
+        assert_rejected(done, message)
     package = changed(folder / "hover3.ssp", path, without="resources/scene.json")
-    done = run_command("run", str(package), "--log", str(tmp_path / "a.mcap"))
-    assert done.returncode == 2
+    done = run_command("run", package, "--log", tmp_path / "a.mcap", code=2)
     assert "has no file resources/scene.json" in done.stderr
     assert "No such file" not in done.stderr
 
@@ -225,8 +204,7 @@ def test_scene_file_and_parameters_of_package_are_read(folder: Path, tmp_path: P
         ('source="resources/autopilot.fmu">', f'source="resources/autopilot.fmu">{bindings}'),
         without="resources/scene.json", more={"resources/a.toml": text},
     )  # fmt: skip
-    done = run_command("check", str(package))
-    assert done.returncode == 2
+    done = run_command("check", package, code=2)
     assert "services.autopilot.start.parameters.autopilot.none: unknown variable" in done.stderr
 
 
@@ -240,8 +218,5 @@ def test_scene_file_and_parameters_of_package_are_read(folder: Path, tmp_path: P
 )
 def test_invalid_export_is_rejected_in_one_line(arguments: list[str], message: str, tmp_path: Path) -> None:
     out = tmp_path / "x.ssp"
-    done = run_command("export-ssp", "hover", "--out", str(out), *arguments)
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert done.stderr.count("\n") == 1
+    assert_rejected(run_command("export-ssp", "hover", "--out", out, *arguments), message)
     assert not out.exists()

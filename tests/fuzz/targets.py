@@ -113,13 +113,9 @@ def logs() -> Target:
 
 def overrides() -> Target:
     texts = (
-        b"airframe.mass.total=2.5",
-        b'sensors.imu.preset="bmi088"',
-        b"sensors.imu={preset='mpu6000'}",
-        b"trajectory.phase.0.duration=3.0",
-        b"effects.random_wind_force={mean=[1.0, 2, 0]}",
-        b"run.duration=1e1",
-    )
+        b"airframe.mass.total=2.5", b'sensors.imu.preset="bmi088"', b"sensors.imu={preset='mpu6000'}",
+        b"trajectory.phase.0.duration=3.0", b"effects.random_wind_force={mean=[1.0, 2, 0]}", b"run.duration=1e1",
+    )  # fmt: skip
     scene = SMALL_SCENES[1].decode()
 
     def read(data: bytes) -> None:

@@ -3,12 +3,21 @@
 import signal
 import sys
 from pathlib import Path
+from typing import NamedTuple
 
 import pytest
 
 from lapwing.cli import entry_point as cli
 
 ROOT = Path.cwd()
+
+
+class Ended(NamedTuple):
+    """Exit code and texts of a command, named as those of a process."""
+
+    returncode: int
+    stdout: str
+    stderr: str
 
 
 @pytest.fixture
@@ -26,7 +35,7 @@ def lapwing(monkeypatch, tmp_path, capfd):
         except SystemExit as end:
             code = end.code
         output = capfd.readouterr()
-        return code, output.out, output.err
+        return Ended(code, output.out, output.err)
 
     yield call
     for number, handler in handlers.items():

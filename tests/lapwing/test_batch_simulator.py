@@ -70,38 +70,32 @@ def test_every_member_is_bit_for_bit_single_vehicle(batch):
         assert np.array_equal(rows(end)[k], alone(k, tuple(volts[k]), 125))
 
 
-def test_batch_at_limit_of_axial_inflow_equals_single_vehicle():
-    """Two of three members reach the limit, whose steps have error control."""
-    batch, ticks, volts = lapwing.BatchSimulator("hexacopter_tilted", 3), 25, (4.0, 5.0, 3.0, 6.0, 4.5, 5.5)
-    start = {"position_world": (0.0, 0.0, 50.0), "rotor_speed": np.full((3, 6), 400.0)}
-    climb = [0.0, 6.0, -6.0]
+LIMITS = [  # scene, overrides, voltages, speeds of the rotors of each member
+    ("hexacopter_tilted", [], (4.0, 5.0, 3.0, 6.0, 4.5, 5.5), [400.0] * 3),
+    *(
+        ("hover", [f"effects.{effect}"], (28.0, 31.0, 30.0, 33.0), [310.0, 335.0, 150.0])
+        for effect in ("dc_motor={inductance=5e-5}", "dc_motor={}", "dynamic_inflow={}")
+    ),
+]
+
+
+@pytest.mark.parametrize(("scene", "overrides", "volts", "speeds"), rest_nightly(*LIMITS, keep=2))
+def test_limits_of_inflow_motors_and_flow_are_bit_for_bit_single_vehicle(scene, overrides, volts, speeds):
+    """Two of three members reach a limit, whose steps have error control."""
+    batch, ticks, climb, rotors = (
+        lapwing.BatchSimulator(scene, 3, overrides=overrides),
+        25,
+        (0.0, 6.0, -6.0),
+        len(volts),
+    )
+    start = {"position_world": (0.0, 0.0, 50.0), "rotor_speed": np.repeat(speeds, rotors).reshape(3, rotors)}
     batch.reset(**start, velocity_world=[(0.0, 0.0, v) for v in climb])
     end = batch.step(motor_voltages=np.tile(volts, (3, 1)), ticks=ticks)
-    plant = resolve(load("hexacopter_tilted")).services["plant"].parameters
+    plant = resolve(load(scene, overrides)).services["plant"].parameters
     core, state = plant.core, plant.start.vehicle
     for k, v in enumerate(climb):
         motion = state.motion._replace(
-            position_world=(0.0, 0.0, 50.0), velocity_world=(0.0, 0.0, v), rotor_speed=(400.0,) * 6
-        )
-        one = state._replace(motion=motion)
-        one = step_alone(core.method, core.vehicle, core.key, one, volts, core.step, core.steps, ticks)
-        assert np.array_equal(rows(end)[k], pack_row(one.motion))
-
-
-@pytest.mark.parametrize("effect", rest_nightly("dc_motor={inductance=5e-5}", "dc_motor={}", "dynamic_inflow={}"))
-def test_limits_of_motors_and_flow_are_bit_for_bit_single_vehicle(effect):
-    """Rotors of two of three members reach a limit, whose steps have error control."""
-    overrides, ticks, volts = [f"effects.{effect}"], 25, (28.0, 31.0, 30.0, 33.0)
-    batch = lapwing.BatchSimulator("hover", 3, overrides=overrides)
-    speeds, climb = [310.0, 335.0, 150.0], [0.0, 6.0, -6.0]
-    start = {"position_world": (0.0, 0.0, 50.0), "rotor_speed": np.repeat(speeds, 4).reshape(3, 4)}
-    batch.reset(**start, velocity_world=[(0.0, 0.0, v) for v in climb])
-    end = batch.step(motor_voltages=np.tile(volts, (3, 1)), ticks=ticks)
-    plant = resolve(load("hover", overrides)).services["plant"].parameters
-    core, state = plant.core, plant.start.vehicle
-    for k, v in enumerate(climb):
-        motion = state.motion._replace(
-            position_world=(0.0, 0.0, 50.0), velocity_world=(0.0, 0.0, v), rotor_speed=(speeds[k],) * 4
+            position_world=(0.0, 0.0, 50.0), velocity_world=(0.0, 0.0, v), rotor_speed=(speeds[k],) * rotors
         )
         one = state._replace(motion=motion)
         one = step_alone(core.method, core.vehicle, core.key, one, volts, core.step, core.steps, ticks)
@@ -153,13 +147,6 @@ def test_body_rate_control_equals_voltages_computed_in_numpy():
         volts = speed * 60.0 / (2.0 * np.pi) / (a.motor.gear_ratio * a.motor.speed_constant)
         other.step(motor_voltages=np.clip(volts, 0.0, a.voltage_max))
     assert rows(one.state) == pytest.approx(rows(other.state), rel=1e-9, abs=1e-9)
-
-
-def test_elements_that_fill_last_block_repeat_last_member():
-    batch = lapwing.BatchSimulator("hover", 3)
-    batch.reset(position_world=(0.0, 0.0, 50.0), rotor_speed=batch.hover_speed)
-    batch.step(motor_voltages=np.array([[31.0] * 4, [32.0] * 4, [33.0, 31.0, 33.0, 31.0]]), ticks=5)
-    assert (batch._blocks[-1, :, 3:] == batch._blocks[-1, :, 2:3]).all()
 
 
 @pytest.mark.parametrize(

@@ -13,36 +13,11 @@ import pytest
 
 from lapwing.flights.flight_data import FlightData
 from lapwing.runs import single_process_run
+from tests.scenes import head, phase, vehicle
 
 SINGLE = ("--mode", "single-process", "--log", "a.mcap", "--json", "a.json")
 HUB = 0.35171491  # [m] of the delivery drone, along x and y
 FEET = 0.35  # [m] below its centre
-VEHICLE = """
-[[vehicle]]
-name = "{name}"
-airframe = "delivery_drone"
-initial_position = [{x}, 0.3]
-[[vehicle.trajectory.phase]]
-name = "climb"
-z = {{ kind = "minimum_jerk", to = 3.0, duration = 3.0 }}
-[[vehicle.trajectory.phase]]
-name = "meet"
-x = {{ kind = "minimum_jerk", to = {way}, duration = 4.0 }}
-[[vehicle.trajectory.phase]]
-name = "land"
-z = {{ kind = "minimum_jerk", to = 0.0, duration = 4.0 }}
-"""
-MEETING = """
-[run]
-duration = 20.0
-[effects.gravity]
-[effects.rotor_thrust]
-[effects.ground_contact]
-[effects.collision]
-[autopilot]
-gains = "tuned"
-estimator = "ground_truth"
-"""
 
 
 def crash(lapwing, *arguments):
@@ -94,8 +69,11 @@ def test_crash_after_motor_failure_names_the_motor_first(lapwing):
 
 @pytest.mark.long
 def test_crash_into_another_vehicle_names_it(lapwing):
-    vehicles = [VEHICLE.format(name=name, x=x, way=-x) for name, x in (("left", -4.0), ("right", 4.0))]
-    Path("meeting.toml").write_text(MEETING + "".join(vehicles))
+    vehicles = [
+        vehicle(name, phase("climb", 3.0, z=3.0), phase("meet", 4.0, x=-x), phase("land", 4.0, z=0.0), start=(x, 0.3))
+        for name, x in (("left", -4.0), ("right", 4.0))
+    ]
+    Path("meeting.toml").write_text(head(20.0, "collision") + "".join(vehicles))
     words, reported, (left, right), page = crash(lapwing, "meeting.toml")
     assert re.search(r"left: Crashed at \S+ s: hit vehicle right, 3\.0 m above ground, at \S+ m/s", words), words
     assert re.search(r"right: Crashed at \S+ s: hit vehicle left, ", words), words

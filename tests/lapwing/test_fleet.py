@@ -1,8 +1,6 @@
 """Scene of several vehicles from the command line: both modes, summary, report, resimulation."""
 
 import json
-import subprocess
-import sys
 
 import pytest
 from page_texts import page_text
@@ -10,15 +8,14 @@ from page_texts import page_text
 import lapwing
 from lapwing import Flight
 from lapwing.services.common.schemas.run_schema import SHIPPED
+from tests.commands import assert_rejected, run_command
 
 pytestmark = pytest.mark.long
 SHORT = ["--set", "run.duration=1.5"]
 
 
 def command(*arguments):
-    return subprocess.run(
-        [sys.executable, "-m", "lapwing", *map(str, arguments)], capture_output=True, text=True, timeout=600, check=True
-    ).stdout
+    return run_command(*arguments, code=0).stdout
 
 
 @pytest.fixture(scope="module")
@@ -53,10 +50,10 @@ def test_report_shows_all_paths(flown):
     page = folder / "scout.html"
     command("report", folder / "a.mcap", "--vehicle", "scout", "--out", page)
     assert "quad_x" in page_text(page)
-    words = [sys.executable, "-m", "lapwing", "report", str(folder / "a.mcap"), "--vehicle", "nobody"]
-    done = subprocess.run(words, capture_output=True, text=True, check=False)
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert "vehicle nobody; expected one of left, right, scout" in done.stderr
+    assert_rejected(
+        run_command("report", folder / "a.mcap", "--vehicle", "nobody"),
+        "vehicle nobody; expected one of left, right, scout",
+    )
 
 
 def test_info_verify_and_resimulate_accept_log_of_fleet(flown):
@@ -109,19 +106,13 @@ def test_python_api_for_one_vehicle_rejects_fleet(name):
 
 
 def test_command_for_one_vehicle_rejects_fleet_in_one_line():
-    command = [sys.executable, "-m", "lapwing", "tune", "fleet"]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert done.returncode == 2, done.stderr
-    assert "vehicle: there are 3; expected a scene with one vehicle" in done.stderr
-    assert len(done.stderr.splitlines()) == 1
+    assert_rejected(run_command("tune", "fleet"), "vehicle: there are 3; expected a scene with one vehicle")
 
 
 def test_overlapping_vehicles_have_crashed_unless_collision_is_false(tmp_path):
     """Without the effect nothing pushes them apart: two vehicles 0.1 m apart follow their paths and land."""
     near = ["run", "fleet", "--set", "vehicle.1.initial_position=[0.0,2.9]", "--mode", "single-process", "--log"]
-    words = [sys.executable, "-m", "lapwing", *near, str(tmp_path / "a.mcap")]
-    done = subprocess.run(words, capture_output=True, text=True, check=False)
-    assert done.returncode == 4, done.stdout + done.stderr
+    done = run_command(*near, tmp_path / "a.mcap", code=4)
     text = " ".join(done.stdout.split())
     assert "left: Crashed at 0.00 s: hit vehicle right" in text
     assert "passes through it: the scene has no effects.collision" in text

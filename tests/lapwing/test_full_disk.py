@@ -10,6 +10,7 @@ import pytest
 
 import lapwing
 from lapwing.cosim.log import LogReader
+from tests.commands import assert_rejected, run_command
 
 pytestmark = pytest.mark.long
 
@@ -27,13 +28,8 @@ main()
 
 def run(folder, size, mode):
     code = textwrap.dedent(RUN).replace("BYTES", str(size))
-    return subprocess.run(
-        [sys.executable, "-c", code, str(SCENE), "--mode", mode],
-        capture_output=True,
-        text=True,
-        check=False,
-        cwd=folder,
-    )
+    command = [sys.executable, "-c", code, str(SCENE), "--mode", mode]
+    return subprocess.run(command, capture_output=True, text=True, cwd=folder)
 
 
 @pytest.mark.parametrize("mode", ["single-process", "multi-process"])
@@ -74,10 +70,9 @@ def log(tmp_path_factory):
 )
 def test_output_without_room_leaves_former_file(tmp_path, log, words, name):
     (tmp_path / name).write_text("former file")
-    command = [sys.executable, "-m", "lapwing", *(str(log) if word == "LOG" else word for word in words)]
-    limited = ["sh", "-c", 'ulimit -f 2; exec "$@"', "sh", *command]
-    done = subprocess.run(limited, capture_output=True, text=True, check=False, cwd=tmp_path)
-    assert (done.returncode, done.stderr) == (2, f"lapwing: {name}: cannot be written: file too large\n")
+    words = [log if word == "LOG" else word for word in words]
+    done = run_command(*words, folder=tmp_path, within=["sh", "-c", 'ulimit -f 2; exec "$@"', "sh"])
+    assert_rejected(done, f"lapwing: {name}: cannot be written: file too large\n")
     assert {file.name: file.read_text() for file in tmp_path.iterdir()} == {name: "former file"}
 
 
@@ -86,12 +81,9 @@ def test_output_without_room_leaves_former_file(tmp_path, log, words, name):
 def test_export_to_full_disk_leaves_no_file(tmp_path, command, name):
     (tmp_path / "disk").mkdir()
     part = ["--part", "plant"] if command == "export-fmu" else []
-    words = [sys.executable, "-m", "lapwing", command, "hover", *part, "--out", f"disk/{name}"]
     script = 'mount -t tmpfs -o size=16k none disk && { "$@"; code=$?; ls -A disk; exit $code; }'
-    done = subprocess.run(
-        ["unshare", "--mount", "sh", "-c", script, "sh", *words],
-        capture_output=True, text=True, check=False, cwd=tmp_path,
-    )  # fmt: skip
+    small = ["unshare", "--mount", "sh", "-c", script, "sh"]
+    done = run_command(command, "hover", *part, "--out", f"disk/{name}", folder=tmp_path, within=small)
     if "unshare" in done.stderr or "mount" in done.stderr:
         pytest.skip("needs the right to mount")
     assert (done.returncode, done.stdout) == (2, "")

@@ -1,4 +1,4 @@
-"""Ctrl-C during the imports of the command: one line and exit code 130, from its first statement on."""
+"""Signals during the imports of the command: one line and an exit code, from its first statement on."""
 
 import os
 import re
@@ -6,9 +6,12 @@ import signal
 import subprocess
 import sys
 import textwrap
+import time
 from pathlib import Path
 
 import pytest
+
+from tests.participants import participants
 
 STRIKE = """
 import os, signal, sys
@@ -109,3 +112,24 @@ def test_ctrl_c_in_flight_has_equal_text_in_both_modes(tmp_path, mode):
         flown.kill()
     assert (flown.returncode, err) == (130, "lapwing: ended by SIGINT\n")
     assert re.search(r"^Aborted at \d+\.\d\d s: the run was ended$", out, re.MULTILINE)
+
+
+SCENE = "formation"  # its specification is larger than the buffer of a pipe
+
+
+@pytest.mark.long
+def test_process_stopped_before_its_specification_is_named(tmp_path):
+    command = [sys.executable, "-m", "lapwing", "run", SCENE, "--log", str(tmp_path / "a.mcap")]
+    with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as launcher:
+        while "plant" not in (names := participants(launcher.pid)):
+            assert launcher.poll() is None
+            time.sleep(0.005)
+        os.kill(names["plant"], signal.SIGSTOP)
+        try:
+            _, error = launcher.communicate(timeout=300.0)
+        except subprocess.TimeoutExpired:
+            os.kill(names["plant"], signal.SIGKILL)
+            launcher.kill()
+            raise
+    assert launcher.returncode == 1
+    assert error.startswith("lapwing: plant: stopped for 2.5 s, at t = 0.000 s")

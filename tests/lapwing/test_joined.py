@@ -14,6 +14,7 @@ from lapwing.cosim.log import LogReader
 from lapwing.messages import Log
 from lapwing.services.process_table import FOXGLOVE, required_processes
 from lapwing.services.scene_resolver import load, resolve
+from tests.commands import run_command
 from tests.endpoints import loopback_endpoints
 from tests.services.foxglove.client import patient
 
@@ -31,7 +32,7 @@ def start(*words):
 @pytest.fixture(scope="module", autouse=True)
 def compiled():
     """Compile the kernels first: a mission waits too short for compilation on a busy machine."""
-    subprocess.run([sys.executable, "-m", "lapwing", "precompile", "hover"], check=True, capture_output=True)
+    run_command("precompile", "hover", code=0)
 
 
 def flies(log):

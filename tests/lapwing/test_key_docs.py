@@ -1,22 +1,28 @@
-"""Documentation of keys from the code: types, bounds, defaults, comments behind fields."""
+"""Documentation of keys from the code: types, bounds, defaults, units, descriptions."""
 
+import re
 from typing import Annotated, Literal, NamedTuple, get_args
 
 import pytest
 from annotated_types import Gt, Le
+from page_texts import page_text
 from pydantic import BaseModel, Field
+from typer.testing import CliRunner
 
+from lapwing.cli.main import app
 from lapwing.dynamics import effects
 from lapwing.dynamics.field_comments import comments, split
 from lapwing.dynamics.vehicles.airframe import Airframe
-from lapwing.file_schemas.annotations import schema_of
+from lapwing.file_schemas import descriptions
+from lapwing.file_schemas.annotations import dereference, schema_of
 from lapwing.file_schemas.descriptions import effect_settings
-from lapwing.file_schemas.json_schema import sensor_tables
+from lapwing.file_schemas.json_schema import SCHEMAS, key_units, sensor_tables
 from lapwing.file_schemas.key_docs import REQUIRED, keys
 from lapwing.services.scene_resolver import vocabulary
 from lapwing.services.sensors.fault_schedule import FaultTable
 from lapwing.services.trajectory.phases import Phase
 from lapwing.services.trajectory.segments import KINDS
+from tests.commands import run_command
 
 
 class Base(BaseModel):
@@ -86,3 +92,59 @@ def _classes(hint):
 def test_every_key_has_unit_or_description(table):
     silent = [key.name for key in keys(table) if not (key.unit or key.meaning)]
     assert silent == (["kind"] if table in KINDS.values() else []), f"complete the comments in {table.__module__}"
+
+
+def test_units_come_from_scene_and_airframe_schemas():
+    keys = (
+        "vehicle.mass", "effects.random_wind_force.sigma", "airframe.motor.resistance", "solver.step", "run.seed",
+        "a.b",
+    )  # fmt: skip
+    assert key_units(keys) == {
+        "vehicle.mass": "kg",
+        "effects.random_wind_force.sigma": "m/s",
+        "airframe.motor.resistance": "ohm",
+        "solver.step": "s",
+    }
+
+
+@pytest.mark.long
+def test_campaign_report_has_units_of_parameters(tmp_path):
+    command = ["campaign", "hover", "--runs", "12", "--workers", "1", "--out", "c"]
+    command += ["--vary", "vehicle.mass=uniform(10.0,10.8)", "--report"]
+    run_command(*command, "c.html", code=0, folder=tmp_path)
+    assert '"text":"vehicle.mass [kg]"' in page_text(tmp_path / "c.html")
+    run_command(*command, "c.pdf", code=0, folder=tmp_path)
+    assert (tmp_path / "c.pdf").read_bytes().count(b"/MediaBox [ 0 0 595.44 841.68 ]") >= 2
+
+
+def undescribed(schema, node, path=""):
+    """Yield the paths of properties without a description beyond a unit, as often as an alternative has them."""
+    node = dereference(schema, node)
+    for name, value in node.get("properties", {}).items():
+        text = dereference(schema, value).get("description", "")
+        if "const" not in value and not re.sub(r"\[[^\]]*\]", "", text).strip():
+            yield f"{path}.{name}"
+        yield from undescribed(schema, value, f"{path}.{name}")
+    inner = [node[key] for key in ("items", "then", "additionalProperties") if isinstance(node.get(key), dict)]
+    for other in (*inner, *node.get("anyOf", ()), *node.get("oneOf", ()), *node.get("allOf", ())):
+        yield from undescribed(schema, other, path)
+
+
+@pytest.mark.parametrize("kind", SCHEMAS)
+def test_schema_describes_every_key(kind):
+    schema = SCHEMAS[kind]()
+    assert sorted(set(undescribed(schema, schema))) == []
+
+
+def test_list_has_every_effect_and_key():
+    done = CliRunner().invoke(app, ["effects", "--list"])
+    assert done.exit_code == 0, done.output
+    lines = done.output.splitlines()
+    assert [line.partition(":")[0] for line in lines if not line.startswith(" ")] == effects.names()
+    assert "wind_gust: Single discrete gust" in lines
+    assert [line for line in lines if line.endswith(": ")] == []
+
+
+def test_every_preset_is_described():
+    for name, (module, _) in sensor_tables().items():
+        assert all(descriptions.presets(name, module).values()), name

@@ -1,6 +1,6 @@
 """Limits of the environment and a killed process, through the real command: one line that names the cause.
 
-`tests/faults/test_memory_pressure.py` limits the memory.
+`tests/faults/test_faults.py` limits the memory.
 """
 
 import os
@@ -16,6 +16,7 @@ import pytest
 
 from lapwing.cosim.log import LogReader
 from tests.combinations import NIGHTLY, rest_nightly
+from tests.commands import run_command
 from tests.participants import participants
 
 pytestmark = pytest.mark.long
@@ -28,9 +29,7 @@ PATIENCE = 300.0  # [s]
 
 def shell(folder, script, *arguments):
     """Run a script, in which "$@" is the command with its arguments."""
-    command = ["sh", "-c", script, "sh", sys.executable, "-m", "lapwing", *map(str, arguments)]
-    environment = os.environ | {"PYTHONPATH": str(Path.cwd()), "PYTHONDONTWRITEBYTECODE": "1"}
-    return subprocess.run(command, cwd=folder, env=environment, capture_output=True, text=True, timeout=600)
+    return run_command(*arguments, folder=folder, within=["sh", "-c", script, "sh"], PYTHONDONTWRITEBYTECODE="1")
 
 
 def check_one_line(result, *messages, codes=(1, 2)):
@@ -114,7 +113,6 @@ def test_killed_recorder_leaves_advice_to_recover(tmp_path):
     assert error.count("\n") == 1
     advice = f"lapwing recover {tmp_path / 'a.mcap'}"
     assert f"`{advice}`" in out
-    done = subprocess.run([sys.executable, "-m", *advice.split()], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    run_command(*advice.split()[1:], code=0)
     with LogReader(tmp_path / "a_recovered.mcap") as read:
         assert max(time_ns for *_, time_ns, _ in read.messages()) >= 1_000_000_000

@@ -16,6 +16,7 @@ from scipy.io import loadmat
 
 from lapwing.cosim.log import LogReader, LogWriter
 from lapwing.messages import Clock, Point, Pose, Status, VehicleState, header, stamp
+from tests.commands import assert_rejected, run_command
 
 TICK = 4_000_000  # [ns]
 ABOUT = {"scene": "made_up", "seed": "7", "version": "0.1", "solver_integrator": "rk4", "solver_step": "0.001"}
@@ -72,9 +73,7 @@ def test_verify_explains_log_of_another_machine(tmp_path):
     path = write(tmp_path / "a.mcap", commit="0123456789ab", **recorded)
 
     def explain():
-        command = [sys.executable, "-m", "lapwing", "verify", str(path), "--explain"]
-        environment = {**os.environ, "LAPWING_COMMIT": "0123456789ab"}
-        return subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+        return run_command("verify", path, "--explain", LAPWING_COMMIT="0123456789ab")
 
     result = explain()
     assert result.returncode == 0, result.stderr
@@ -270,10 +269,11 @@ def test_log_of_other_version_reports_types_and_verifies_bytes(lapwing, old):
 )
 def test_log_of_other_version_with_changed_types_is_rejected(lapwing, old, arguments):
     before = sorted(os.listdir())
-    code, out, err = lapwing(*arguments)
-    assert (code, out, err.count("\n")) == (2, "", 1)
-    assert f"/drone1/ground_truth: {OLD}; expected a log of this version, Lapwing " in err
-    assert ", got one of Lapwing 0.0.9" in err
+    assert_rejected(
+        lapwing(*arguments),
+        f"/drone1/ground_truth: {OLD}; expected a log of this version, Lapwing ",
+        ", got one of Lapwing 0.0.9",
+    )
     assert sorted(os.listdir()) == before
 
 
@@ -303,7 +303,5 @@ def test_bad_input_is_one_line(lapwing, tmp_path, foreign, arguments, output):
     (tmp_path / "cut.mcap").write_bytes(whole[:-100])
     (tmp_path / "text.mcap").write_text("no log")
     before = sorted(os.listdir())
-    code, _, err = lapwing(*arguments)
-    assert (code, err.count("\n")) == (2, 1)
-    assert output in err
+    assert_rejected(lapwing(*arguments), output)
     assert sorted(os.listdir()) == before

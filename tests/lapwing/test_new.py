@@ -2,7 +2,6 @@
 
 import ast
 import json
-import os
 import re
 import subprocess
 import sys
@@ -20,6 +19,7 @@ from lapwing.runs.resimulate import resimulate
 from lapwing.services.process_main import ProcessSpec
 from lapwing.services.scene_resolver import from_resolved, load, resolve
 from lapwing.studies.simulate import fly
+from tests.commands import assert_rejected, run_command
 
 pytestmark = pytest.mark.long
 
@@ -35,13 +35,6 @@ def scene(tmp_path):
     return lambda *overrides: load(path, ["run.duration=1.5", *overrides])
 
 
-def run(folder, *command):
-    environment = os.environ | {"PYTHONPATH": str(Path.cwd())}
-    return subprocess.run(
-        [sys.executable, "-m", *command], cwd=folder, env=environment, capture_output=True, text=True, check=False
-    )
-
-
 def flat(tables, path=""):
     """Yield dotted key and value of each entry."""
     for key, value in tables.items():
@@ -53,16 +46,17 @@ def flat(tables, path=""):
 
 @pytest.mark.parametrize("kind", ["effect", "sensor", "controller", "estimator", "segment"])
 def test_created_module_passes_its_test(tmp_path, kind):
-    created = run(tmp_path, "lapwing", "new", kind, f"my_{kind}")
+    created = run_command("new", kind, f"my_{kind}", folder=tmp_path)
     assert (created.returncode, created.stderr) == (0, "")
     assert created.stdout.split() == [f"my_{kind}.py", f"test_my_{kind}.py"]
-    result = run(tmp_path, "pytest", "-q", "-p", "no:cacheprovider", ".")
+    tests = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "."]
+    result = subprocess.run(tests, cwd=tmp_path, capture_output=True, text=True)
     assert result.returncode == 0, result.stdout
 
 
 @pytest.mark.parametrize("kind", ["effect", "sensor", "controller", "estimator", "segment"])
 def test_created_module_flies_by_its_first_lines(tmp_path, kind):
-    assert run(tmp_path, "lapwing", "new", kind, f"my_{kind}").returncode == 0
+    run_command("new", kind, f"my_{kind}", folder=tmp_path, code=0)
     text = ast.get_docstring(ast.parse((tmp_path / f"my_{kind}.py").read_text()))
     tables = tomllib.loads("\n".join(line for line in text.splitlines() if line.startswith("    ")))
     scene = tmp_path / "my_flight.toml"
@@ -76,21 +70,18 @@ def test_created_module_flies_by_its_first_lines(tmp_path, kind):
     else:
         for key, value in flat(tables):
             options += ["--set", f"{key}={json.dumps(value)}"]
-    result = run(tmp_path, "lapwing", "run", "my_flight.toml", "--mode", "single-process", *options)
-    assert result.returncode == 0, result.stdout + result.stderr
+    run_command("run", "my_flight.toml", "--mode", "single-process", *options, folder=tmp_path, code=0)
 
 
 def test_created_scene_flies(tmp_path):
-    assert run(tmp_path, "lapwing", "new", "scene", "my_flight").stdout == "my_flight.toml\n"
-    result = run(tmp_path, "lapwing", "run", "my_flight.toml", "--mode", "single-process")
-    assert result.returncode == 0, result.stderr
+    assert run_command("new", "scene", "my_flight", folder=tmp_path).stdout == "my_flight.toml\n"
+    result = run_command("run", "my_flight.toml", "--mode", "single-process", folder=tmp_path, code=0)
     assert re.search(r"Landed .* ends at \(6\.00, 4\.00, ", " ".join(result.stdout.split()))
-    again = run(tmp_path, "lapwing", "new", "scene", "my_flight")
-    assert (again.returncode, again.stderr.count("\n")) == (2, 1)
+    assert_rejected(run_command("new", "scene", "my_flight", folder=tmp_path))
 
 
 def test_created_scene_has_its_own_title_and_valid_further_tables(tmp_path):
-    run(tmp_path, "lapwing", "new", "scene", "my_flight")
+    run_command("new", "scene", "my_flight", folder=tmp_path)
     path = tmp_path / "my_flight.toml"
     assert load(path).lookup("run.title") == "my flight: a first flight"
     text = re.sub(r"^# (?=\[|[a-z_]+ = )", "", path.read_text(), flags=re.MULTILINE)

@@ -2,8 +2,6 @@
 
 import json
 import os
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -11,6 +9,7 @@ import pytest
 from lapwing.cli import run_options
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.scene_resolver import load, resolve
+from tests.commands import assert_rejected, run_command
 from tests.cosim.memory_log import fly
 
 PLAN = "lapwing/scenes/plans/delivery.plan"
@@ -79,26 +78,8 @@ def test_refused_plan_ends_command_before_flight(tmp_path, mode, part, message):
     items = [{"type": "SimpleItem", "frame": 3, "command": command, "params": params} for command, params in raws]
     plan = tmp_path / "a.plan"
     plan.write_text(json.dumps({"fileType": "Plan", "mission": {"items": items}, **part}))
-    scene, root = Path("lapwing/scenes/groundstation.toml").resolve(), str(Path.cwd())
-    command = [
-        sys.executable,
-        "-m",
-        "lapwing",
-        "run",
-        str(scene),
-        "--plan",
-        str(plan),
-        "--mode",
-        mode,
-        "--speed",
-        "max",
-    ]
-    done = subprocess.run(
-        command, cwd=tmp_path, env=os.environ | {"PYTHONPATH": root}, capture_output=True, text=True, check=False
-    )
-    assert (done.returncode, done.stdout) == (2, "")
-    assert done.stderr.startswith(f"lapwing: {plan}: {message}")
-    assert done.stderr.count("\n") == 1
+    words = ["run", "groundstation", "--plan", plan, "--mode", mode, "--speed", "max"]
+    assert_rejected(run_command(*words, folder=tmp_path), f"lapwing: {plan}: {message}")
     assert os.listdir(tmp_path) == ["a.plan"]
 
 
@@ -131,10 +112,7 @@ def test_skipped_items_are_reported(tmp_path):
 
 @pytest.mark.long
 def test_impact_on_slope_is_no_motor_failure(tmp_path):
-    command = [sys.executable, "-m", "lapwing", "run", "groundstation", "--plan", PLAN, "--speed", "max"]
-    command += ["--mode", "single-process", "--log", str(tmp_path / "flown.mcap")]
-    command += ["--set", "environment.terrain.slope=[0.0, 0.27]"]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    options = ["--mode", "single-process", "--speed", "max", "--set", "environment.terrain.slope=[0.0, 0.27]"]
+    done = run_command("run", "groundstation", "--plan", PLAN, *options, "--log", tmp_path / "flown.mcap", code=0)
     assert "motor has failed" not in done.stdout
     assert "Landed at" in done.stdout

@@ -13,14 +13,14 @@ import pytest
 import lapwing as package
 from lapwing.views.view3d import headless
 from lapwing.views.view3d.render import Shot, write_film
+from tests.commands import assert_rejected, run_command
 
 pytest.importorskip("viser", reason="needs viser (pip install lapwing[view3d])")
 SMALL = ("--size", "160x120")
 
 
 def run(folder, *words):
-    command = [sys.executable, "-m", "lapwing", "render", *map(str, words)]
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)
+    return run_command("render", *words, folder=folder)
 
 
 @pytest.fixture(scope="module")
@@ -52,9 +52,10 @@ def test_render_rejects_wrong_options_in_one_line(log, tmp_path, words, message)
 
 def test_film_without_encoder_is_rejected_in_one_line(lapwing, tmp_path, monkeypatch):
     monkeypatch.setitem(sys.modules, "imageio_ffmpeg", None)
-    code, _, err = lapwing("render", tmp_path / "none.mcap", "--out", tmp_path / "a.mp4")
-    assert (code, err.count("\n")) == (2, 1)
-    assert "a.mp4: needs the encoder of imageio-ffmpeg; pip install lapwing[view3d], or write .webp" in err
+    assert_rejected(
+        lapwing("render", tmp_path / "none.mcap", "--out", tmp_path / "a.mp4"),
+        "a.mp4: needs the encoder of imageio-ffmpeg; pip install lapwing[view3d], or write .webp",
+    )
 
 
 @pytest.mark.skipif(headless.PROGRAM is None, reason="needs Chromium")
@@ -113,26 +114,6 @@ def test_animation_has_its_pictures_and_length(tmp_path, name):
         film.load()
         durations.append(film.info["duration"])
     assert (film.size, durations) == ((160, 120), [250] * 3)
-
-
-@pytest.mark.long
-@pytest.mark.skipif(headless.PROGRAM is None, reason="needs Chromium")
-@pytest.mark.parametrize("name", ["b.gif", "b.webp"])
-def test_command_writes_animation_of_moving_vehicle(log, name):
-    from PIL import Image
-
-    done = run(log.parent, log, "--out", name, *SMALL, "--from", "1", "--to", "2", "--fps", "2")
-    assert done.returncode == 0, done.stderr
-    film = Image.open(log.parent / name)
-    pictures = []
-    for k in range(film.n_frames):
-        film.seek(k)
-        pictures.append(np.asarray(film.convert("RGB"), float))
-        assert film.info["duration"] == 500
-    assert [picture.shape for picture in pictures] == [(120, 160, 3)] * 3
-    assert pictures[0][2, 80, 2] - pictures[0][2, 80, 0] > 40.0  # blue sky
-    assert np.ptp(pictures[0][40:80, 60:100].mean(axis=2)) > 60.0  # the vehicle
-    assert np.abs(pictures[0] - pictures[-1]).mean() > 0.05  # which moves
 
 
 @pytest.mark.long

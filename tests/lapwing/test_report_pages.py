@@ -1,15 +1,11 @@
 """Pages of real flights, written by the commands as processes and opened in a browser."""
 
-import subprocess
-import sysconfig
-from pathlib import Path
-
 import pytest
 from page_texts import page_text
 
 from lapwing.views.view3d import headless
+from tests.commands import run_command
 
-LAPWING = Path(sysconfig.get_path("scripts")) / "lapwing"
 SMALL, WITH_VIEW = 2_000_000, 5_000_000  # [byte] of a page
 UNTIL = """
     const until = async (holds) => {
@@ -24,9 +20,7 @@ needs_chromium = pytest.mark.skipif(headless.PROGRAM is None, reason="needs Chro
 
 def run(folder, *arguments):
     """Run a command of Lapwing in a folder; return what it prints."""
-    done = subprocess.run([LAPWING, *map(str, arguments)], cwd=folder, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    return run_command(*arguments, code=0, folder=folder).stdout
 
 
 @pytest.fixture(scope="module")

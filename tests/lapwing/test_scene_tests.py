@@ -1,6 +1,5 @@
 """`lapwing test` and the pytest plug-in: failed vehicles and failed simulations differ, failed flights are kept."""
 
-import os
 import subprocess
 import sys
 from pathlib import Path
@@ -8,16 +7,11 @@ from xml.etree import ElementTree
 
 import yaml
 
+from tests.commands import run_command
+
 SCENES = Path("lapwing/scenes").resolve()
 HOVER = (SCENES / "hover.toml").read_text()
 FAILS = HOVER + "\n[success]\nrequire = [\"outcome == 'landed'\", 'max_tilt > 1.0']\n"
-
-
-def run(folder, *command):
-    environment = os.environ | {"PYTHONPATH": str(Path.cwd())}
-    return subprocess.run(
-        [sys.executable, "-m", *command], cwd=folder, env=environment, capture_output=True, text=True, check=False
-    )
 
 
 def test_command_tells_failed_vehicle_from_failed_simulation(tmp_path):
@@ -25,13 +19,12 @@ def test_command_tells_failed_vehicle_from_failed_simulation(tmp_path):
     scenes.mkdir()
     (scenes / "good.toml").write_text(HOVER)
     (scenes / "bad.toml").write_text(FAILS)
-    result = run(tmp_path, "lapwing", "test", "scenes", "--junit", "flights.xml", "--keep", "kept")
+    result = run_command("test", "scenes", "--junit", "flights.xml", "--keep", "kept", folder=tmp_path)
     assert (result.returncode, result.stderr) == (4, "")
     assert result.stdout.endswith("1 passed, 1 failed, 0 errors\n")
     assert {path.name for path in (tmp_path / "kept").iterdir()} == {"bad.mcap", "bad.html"}
     (scenes / "invalid.toml").write_text(HOVER.replace("gravity", "gravty"))
-    result = run(tmp_path, "lapwing", "test", "scenes", "--junit", "flights.xml", "--keep", "kept")
-    assert result.returncode == 1
+    result = run_command("test", "scenes", "--junit", "flights.xml", "--keep", "kept", folder=tmp_path, code=1)
     suite = ElementTree.parse(tmp_path / "flights.xml").getroot()
     assert suite.attrib == {"name": "scenes", "tests": "3", "failures": "1", "errors": "1"}
     cases = {case.get("name"): [child.tag for child in case] for case in suite}
@@ -60,7 +53,8 @@ def test_fixture_flies_and_keeps_flights_of_failed_tests_in_workers(tmp_path):
     (tmp_path / "bad.toml").write_text(FAILS)
     (tmp_path / "test_flights.py").write_text(TESTS)
     own = ["-p", "lapwing.pytest_plugin", "-p", "no:cacheprovider", "-n", "2", "--lapwing-keep", "kept"]
-    result = run(tmp_path, "pytest", *own)
+    tests = [sys.executable, "-m", "pytest", *own]
+    result = subprocess.run(tests, cwd=tmp_path, capture_output=True, text=True)
     assert "1 passed" in result.stdout, result.stdout
     assert "2 failed" in result.stdout
     assert "success.require: max_tilt > 1.0" in result.stdout

@@ -7,6 +7,7 @@ import pytest
 
 import lapwing as package
 from lapwing.views import rerun_export as rerun
+from tests.commands import assert_rejected
 
 
 def _fly(scene, folder):
@@ -39,9 +40,7 @@ def test_invalid_log_is_rejected_in_one_line(lapwing, log, monkeypatch, tmp_path
         (["text.mcap"], "text.mcap: not an MCAP file"),
         ([log, "--rerun"], "Rerun is not installed; pip install lapwing[view]"),
     ):
-        code, _, err = lapwing("view", *arguments)
-        assert (code, err.count("\n")) == (2, 1)
-        assert output in err
+        assert_rejected(lapwing("view", *arguments), output)
 
 
 @pytest.mark.long

@@ -15,7 +15,6 @@ import json
 import math
 import os
 import re
-import subprocess
 import sys
 import tempfile
 from itertools import pairwise
@@ -26,6 +25,7 @@ import numpy as np
 from lapwing.api.flight import Flight
 from lapwing.services.common.schemas.vehicle_schema import airframe, gravity, thrust_coefficient
 from lapwing.services.scene_resolver import load
+from tests.commands import run_command
 
 VARIABLES = {"px4": "PX4", "ardupilot": "ARDUCOPTER", "betaflight": "BETAFLIGHT"}
 SCRIPTED = {"px4": "px4/scripted_px4.py", "ardupilot": "ardupilot/scripted_ardupilot.py"}
@@ -108,9 +108,9 @@ def figures(log: Path, summary: Path, full: float) -> dict:
 def fly(firmware: str, program: str, folder: Path, name: str, mode: str, *options: str) -> dict:
     """Fly once. Return the figures."""
     scene, log, summary = f"{firmware}_quad", folder / f"{name}.mcap", folder / f"{name}.json"
-    command = [sys.executable, "-m", "lapwing", "run", scene, "--mode", mode, "--log", str(log)]
-    command += ["--json", str(summary), *overrides(firmware, program), *options]
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    done = run_command(
+        "run", scene, "--mode", mode, "--log", log, "--json", summary, *overrides(firmware, program), *options
+    )
     (folder / f"{name}.txt").write_text(done.stdout + done.stderr)
     if not summary.exists() or not summary.stat().st_size:
         return {"outcome": "failed", "text": done.stderr.strip()}

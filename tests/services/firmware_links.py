@@ -4,7 +4,6 @@ import ctypes
 import json
 import os
 import socket
-import subprocess
 import sys
 import threading
 from contextlib import ExitStack, suppress
@@ -17,6 +16,7 @@ from lapwing.services.common.firmware.block import FirmwareBlock
 from lapwing.services.common.firmware.firmware_config import FirmwareConfig
 from lapwing.services.common.firmware.hold import COMMAND, FirmwareCommand
 from lapwing.services.common.firmware.link import FirmwareOutput
+from tests.commands import run_command
 
 HOST = "127.0.0.1"
 
@@ -40,9 +40,7 @@ def free_instance(firmware):
 
 def lapwing(*arguments, code=0, **options):
     """Run a command. Return its result; check its exit code unless `code` is None."""
-    command = [sys.executable, "-m", "lapwing", *map(str, arguments)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=1800, check=False, **options)
-    assert code in (None, done.returncode), done.stdout + done.stderr
+    done = run_command(*arguments, code=code, **options)
     assert "Traceback" not in done.stderr
     return done
 

@@ -2,10 +2,7 @@
 
 import json
 import math
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -22,6 +19,7 @@ from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.json_file import write_json
 from lapwing.studies.performance import card, show
 from lapwing.views.terminal import console
+from tests.commands import run_command
 
 ROOT = Path(__file__).parents[2]
 VEHICLE = ROOT / "lapwing/scenes/vehicles/delivery_drone.toml"
@@ -167,8 +165,7 @@ def test_shipped_vehicles_take_more_power_than_ideal_rotors(scene):
 
 @pytest.mark.long
 def test_command_prints_loads_and_margins_in_hover(tmp_path):
-    command = [sys.executable, "-m", "lapwing", "performance", "quad_x", "--json", str(tmp_path / "card.json")]
-    result = subprocess.run(command, capture_output=True, text=True, check=True, env=os.environ | {"COLUMNS": "80"})
+    result = run_command("performance", "quad_x", "--json", tmp_path / "card.json", code=0, COLUMNS="80")
     rows = {row["name"]: row for row in json.loads((tmp_path / "card.json").read_text())}
     for name, unit in {
         "hover power": "W",

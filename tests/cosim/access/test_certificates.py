@@ -4,14 +4,13 @@ import os
 import re
 import ssl
 import stat
-import subprocess
-import sys
 
 import pytest
 import zenoh
 
 from lapwing.cosim.access.certificates import make, tls
 from lapwing.cosim.transport.bus import ZenohBus
+from tests.commands import assert_rejected, run_command
 from tests.endpoints import loopback_endpoints
 
 
@@ -40,16 +39,9 @@ def test_run_names_invalid_certificate(tmp_path, place, time, message):
     times[place] = time.encode()
     path.write_text(ssl.DER_cert_to_PEM_cert(der.replace(period, times[0] + period[13:15] + times[1])))
     (end,) = loopback_endpoints(["a"]).values()
-    command = [sys.executable, "-m", "lapwing", "run", "hover", "--listen", end.replace("tcp/", "tls/")]
-    result = subprocess.run(
-        [*command, "--keys", tmp_path / "keys", "--log", tmp_path / "a.mcap"],
-        capture_output=True,
-        text=True,
-        timeout=600,
-    )
-    assert result.returncode == 2, result.stderr
-    assert result.stderr.count("\n") == 1, result.stderr
-    assert f"router/certificate.pem: {message}" in result.stderr
+    command = ["run", "hover", "--listen", end.replace("tcp/", "tls/"), "--keys", tmp_path / "keys"]
+    done = run_command(*command, "--log", tmp_path / "a.mcap")
+    assert_rejected(done, f"router/certificate.pem: {message}")
     assert not (tmp_path / "a.mcap").exists()
 
 

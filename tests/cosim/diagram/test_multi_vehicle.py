@@ -20,24 +20,13 @@ from tests.cosim.memory_log import fly
 from tests.cosim.parts.signals import Signals
 from tests.cosim.small_graph import graph_of
 from tests.cosim.test_agreement import fly_apart
+from tests.scenes import head, phase
 
 pytestmark = pytest.mark.long
 
 WIND = ["effects.random_wind_force.sigma=1.0", "effects.random_wind_force.allow_body_drag=true"]
 SHORT = ["run.duration=1.0", *WIND]
-COMMON = """
-[run]
-duration = 1.0
-[effects.gravity]
-[effects.rotor_thrust]
-[effects.ground_contact]
-[autopilot]
-gains = "tuned"
-estimator = "ground_truth"
-[[trajectory.phase]]
-name = "climb"
-z = { kind = "minimum_jerk", to = 1.0, duration = 1.0 }
-"""
+COMMON = head(1.0) + phase("climb", 1.0, "trajectory", z=1.0)
 
 
 def fleet_of(n, tmp_path):
@@ -185,10 +174,10 @@ def test_fault_names_vehicle_and_key(override):
     [
         (
             "[vehicle.communication]\nrate = 100\n",
-            "many.toml:15: vehicle.0.communication: all vehicles share this table",
+            "many.toml:18: vehicle.0.communication: all vehicles share this table",
         ),
-        ("[vehicle.effects.gravty]\n", "many.toml:15: vehicle.0.effects.gravty: unknown effect 'gravty'"),
-        ("[[vehicle]]\nairframe = 3\n", "many.toml:16: vehicle.1.airframe: expected a text, got 3"),
+        ("[vehicle.effects.gravty]\n", "many.toml:18: vehicle.0.effects.gravty: unknown effect 'gravty'"),
+        ("[[vehicle]]\nairframe = 3\n", "many.toml:19: vehicle.1.airframe: expected a text, got 3"),
         ("[[vehicle]]\n" * 50, "vehicle: 51 vehicles; expected 1 to 50"),
     ],
 )

@@ -3,7 +3,6 @@
 import os
 import signal
 import subprocess
-import sys
 import tempfile
 import time
 from pathlib import Path
@@ -11,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from lapwing.cosim.processes.child_process import Forked, start_early
+from tests.commands import assert_rejected, run_command
 
 
 def test_unused_early_child_is_terminated():
@@ -94,8 +94,6 @@ def test_fork_closes_files_of_other_forks():
     ("arguments", "word"), [(["nowhere.toml"], "nowhere.toml"), (["lapwing/scenes/hover.toml", "--mavlink", "x"], "x")]
 )
 def test_user_error_is_one_line_after_link_start(arguments, word):
-    command = [sys.executable, "-m", "lapwing", "run", *arguments, "--mavlink", "udpout:127.0.0.1:14550"]
-    done = subprocess.run(command, capture_output=True, text=True, cwd=Path(__file__).parents[2], timeout=120)
-    assert done.returncode == 2
-    assert len(done.stderr.splitlines()) == 1
-    assert word in done.stderr
+    assert_rejected(
+        run_command("run", *arguments, "--mavlink", "udpout:127.0.0.1:14550", folder=Path(__file__).parents[2]), word
+    )

@@ -1,7 +1,11 @@
-"""Run monitor on a busy machine: pending messages and news."""
+"""A run on a busy machine: monitor, garbage collection, orphans."""
 
+import subprocess
+import sys
 from collections import deque
 from types import SimpleNamespace
+
+import pytest
 
 from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.processes.run_monitor import RunMonitor
@@ -70,3 +74,48 @@ def test_confirmation_is_news(monkeypatch):
     watched[-1](f"run/{HEARD_KEY}/recorder", True)
     assert monitor.confirmed == {"recorder"}
     assert monitor.last_news > 0.0
+
+
+END = """
+import atexit
+from lapwing.cosim.processes import relax_gc
+
+class Ring:
+    def __init__(self):
+        self.itself = self
+    def __del__(self):
+        print("collected")
+
+{call}
+atexit.register(print, "at exit")
+ring = Ring()
+"""
+
+
+@pytest.mark.parametrize(("call", "output"), [("", ["at exit", "collected"]), ("relax_gc()", ["at exit"])])
+def test_relaxed_process_skips_collection_at_exit(call, output):
+    ended = subprocess.run([sys.executable, "-c", END.format(call=call)], capture_output=True, text=True, check=True)
+    assert ended.stdout.splitlines() == output
+
+
+BUSY = """
+import sys, time
+from types import SimpleNamespace
+from lapwing.cosim.executors import stop_request as process
+process.ORPHANED = 0.1
+process.StopRequest.stop_with_parent(SimpleNamespace(), sys.argv[1])
+print("busy", flush=True)
+time.sleep(600.0)
+"""
+
+
+def test_busy_orphan_process_exits(tmp_path):
+    folder = tmp_path / "sockets"
+    folder.mkdir()
+    command = [sys.executable, "-c", BUSY, f"unixsock-stream/{folder}/plant"]
+    with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as busy:
+        assert busy.stdout.readline() == b"busy\n"
+        assert busy.poll() is None
+        busy.stdin.close()
+        assert busy.wait(60.0) == 1
+    assert not folder.exists()

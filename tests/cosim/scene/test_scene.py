@@ -72,15 +72,10 @@ def test_overrides_change_values_of_named_files(tmp_path):
     parameters = tmp_path / "mine.params"
     parameters.write_text("MPC_XY_CRUISE 3.0\nNAV_ACC_RAD 2.0\n")
     overrides = [
-        f"autopilot.parameters={parameters}",
-        "gains.altitude=[1, 2, 3]",
-        "gains.yaw.0=5",
-        "airframe.mass.total=9.5",
-        "airframe.propeller.diameter=0.5",
-        "airframe.rotors.position.0=[0.4, 0.4, 0.0]",
-        "sensors.imu.gyro.turn_on_bias_dps=1",
-        "autopilot.parameters.NAV_ACC_RAD=4",
-    ]
+        f"autopilot.parameters={parameters}", "gains.altitude=[1, 2, 3]", "gains.yaw.0=5", "airframe.mass.total=9.5",
+        "airframe.propeller.diameter=0.5", "airframe.rotors.position.0=[0.4, 0.4, 0.0]",
+        "sensors.imu.gyro.turn_on_bias_dps=1", "autopilot.parameters.NAV_ACC_RAD=4",
+    ]  # fmt: skip
     scene = load(DELIVERY, overrides)
     assert scene[GainSet].altitude == (1.0, 2.0, 3.0)
     assert scene[GainSet].yaw[0] == 5.0
@@ -190,16 +185,8 @@ def test_invalid_recorded_scene_is_named():
 
 def test_each_table_is_declared_once():
     assert {
-        "run",
-        "communication",
-        "vehicle",
-        "solver",
-        "sensors",
-        "autopilot",
-        "trajectory",
-        "airframe",
-        "gains",
-    } <= set(vocabulary().sections)
+        "run", "communication", "vehicle", "solver", "sensors", "autopilot", "trajectory", "airframe", "gains",
+    } <= set(vocabulary().sections)  # fmt: skip
 
 
 def test_cached_function_is_called_once():

@@ -1,8 +1,9 @@
-"""Bus: memory of pending messages, deferred subscriptions, wake-up, and settings of the session."""
+"""Bus: memory, deferred subscriptions, queries, wake-up, settings of the session and its sockets."""
 
 import ast
 import os
 import re
+import socket
 import subprocess
 import sys
 import threading
@@ -12,7 +13,8 @@ from pathlib import Path
 import pytest
 
 from lapwing.cosim.transport.bus import ZenohBus
-from tests.endpoints import loopback_endpoints
+from lapwing.cosim.transport.session_settings import limit_silence
+from tests.endpoints import absent, loopback_endpoints
 
 MESSAGES = 2000
 KEY, MARK = "test-bus/_batch/plant", bytes(16)
@@ -96,3 +98,31 @@ def test_child_process_does_not_inherit_zenoh_runtime_setting():
     kinds, inherited = output.splitlines()
     assert set(ast.literal_eval(kinds)) == {"app"}
     assert inherited == "None"
+
+
+KEYS = ["test/_alive/responder"]
+
+
+def test_query_returns_payload_or_none():
+    (endpoint,) = loopback_endpoints(["responder"]).values()
+    with ZenohBus([endpoint]) as responder, ZenohBus(connect=[endpoint]) as client:
+        responder.answer("test/_setup/responder", b"payload")
+        responder.declare_liveliness(KEYS[0])
+        assert not absent(client, KEYS, 20.0)
+        assert client.query("test/_setup/responder", 20.0) == b"payload"
+        assert client.query("test/_setup/missing", 20.0) is None
+
+
+def test_timeout_is_set_on_tcp_sockets_only(tmp_path):
+    file = (tmp_path / "a").open("w")
+    with socket.create_server(("127.0.0.1", 0)) as door, socket.create_connection(door.getsockname()) as client:
+        server, _ = door.accept()
+        before = sorted(os.listdir("/proc/self/fd"))
+        limit_silence(1234)
+        assert sorted(os.listdir("/proc/self/fd")) == before
+        for end in (client, server):
+            assert end.getsockopt(socket.IPPROTO_TCP, socket.TCP_USER_TIMEOUT) == 1234
+        client.sendall(b"x")
+        assert server.recv(1) == b"x"
+        server.close()
+    file.close()

@@ -1,4 +1,4 @@
-"""Step packets and log packets: round trips, and rejection of invalid packets."""
+"""Step packets and log packets: layout, round trips, and rejection of invalid packets."""
 
 from typing import NamedTuple
 
@@ -7,10 +7,17 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from lapwing.cosim.config.serialise import to_json
+from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.diagram.topic_encoder import RecordBatch
-from lapwing.cosim.transport.packets import PacketError, StepPacketCodec, pack_log_packet, unpack_log_packet
+from lapwing.cosim.transport.packets import PacketError, StepPacketCodec, layout, pack_log_packet, unpack_log_packet
+from lapwing.kernels.row_packing import pack_row
+from lapwing.messages.message_diff import leaves
 from lapwing.messages.topics import COMMAND_ACKS, OPERATOR, STATUS, TRUTH
+from lapwing.services.common.ports import MotorCommand, StateEstimate
+from lapwing.services.process_table import create_all
+from lapwing.services.scene_resolver import load, resolve
 from tests.cosim.small_graph import graph_of
 
 
@@ -48,18 +55,18 @@ def diagram(*names):
     return graph_of(User(*names), ports=PORTS, kept_ticks=16)
 
 
-def filled(tick):
-    """Return a diagram with values of the due ports at `tick`."""
+def run_of(ticks):
+    """Return a diagram with values of the due ports at each tick in [0, ticks)."""
     result = diagram("pair", "slow", "slower")
     for port in PORTS:
-        if tick % port.period == 0:
+        for tick in range(0, ticks, port.period):
             result.put(port.name, tick, type(port.example)(tick + 0.5, True if port.name == "slow" else -float(tick)))
     return result
 
 
 @pytest.mark.parametrize(("tick", "numbers"), [(0, 6), (3, 2), (5, 4), (10, 6)])
 def test_step_packet_holds_due_rows_in_order(tick, numbers):
-    codec, producer, consumer = StepPacketCodec(PORTS), filled(tick), diagram("slower", "pair", "slow")
+    codec, producer, consumer = StepPacketCodec(PORTS), run_of(tick + 1), diagram("slower", "pair", "slow")
     payload = codec.pack(producer, tick)
     expected = [tick + 0.5, -float(tick), tick + 0.5, 1.0, tick + 0.5, -float(tick)][:numbers]
     assert np.frombuffer(payload, "<f8").tolist() == expected
@@ -71,7 +78,7 @@ def test_step_packet_holds_due_rows_in_order(tick, numbers):
 
 def test_diagram_stores_ports_in_use_only():
     consumer = diagram("slow")
-    StepPacketCodec(PORTS).unpack(StepPacketCodec(PORTS).pack(filled(10), 10), consumer, 10)
+    StepPacketCodec(PORTS).unpack(StepPacketCodec(PORTS).pack(run_of(11), 10), consumer, 10)
     assert consumer.latest("slow", 10) == Single(10.5, True)
     assert not consumer.has("pair")
 
@@ -80,15 +87,6 @@ def test_service_without_due_port_has_no_packet():
     assert [tick for tick in range(12) if StepPacketCodec(PORTS[1:]).due(tick)] == [0, 5, 10]
     assert all(StepPacketCodec(PORTS).due(tick) for tick in range(12))
     assert not StepPacketCodec(()).due(0)
-
-
-def run_of(ticks):
-    """Return a diagram with values of the due ports at each tick in [0, ticks)."""
-    result = diagram("pair", "slow", "slower")
-    for port in PORTS:
-        for tick in range(0, ticks, port.period):
-            result.put(port.name, tick, type(port.example)(tick + 0.5, True if port.name == "slow" else -float(tick)))
-    return result
 
 
 @pytest.mark.parametrize("ticks", [2, 3, 4, 7, 12])
@@ -161,3 +159,27 @@ def test_truncated_log_packet_is_rejected(size):
 def test_log_packet_with_unknown_topic_is_rejected():
     with pytest.raises(PacketError, match=r"^log packet of "):
         unpack_log_packet(WHOLE[:16] + b"\xff\xff" + WHOLE[18:])
+
+
+def test_columns_have_order_of_row():
+    example = MotorCommand((1.0, 2.0, 3.0, 4.0), True, (5.0, 6.0, 7.0, 8.0), (9.0, 10.0, 11.0))
+    named = dict(leaves(example))
+    assert list(named.values()) == pack_row(example).tolist()
+    assert named["motor_voltage.2"] == 3.0
+    assert named["armed"] == 1.0
+    assert named["attitude_reference.0"] == 9.0
+    names = [column for column, _ in leaves(StateEstimate())]
+    assert names[3:7] == ["attitude.w", "attitude.x", "attitude.y", "attitude.z"]
+
+
+@pytest.mark.long
+def test_packet_length_equals_layout():
+    config = resolve(load("hover"))
+    reported = layout(config)
+    assert reported["config"] == to_json(config)
+    diagram = BlockDiagram(config, create_all(config), 64)
+    diagram.advance(26)
+    for name, service in reported["services"].items():
+        for tick in (24, 25):
+            expected = 8 * sum(len(p["columns"]) for p in service["ports"] if tick % p["period"] == 0)
+            assert len(StepPacketCodec(config.services[name].ports).pack(diagram, tick)) == expected

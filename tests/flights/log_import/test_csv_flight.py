@@ -1,3 +1,6 @@
+"""Flights in CSV files: dialects, columns, faults, time."""
+
+import codecs
 import gzip
 
 import numpy as np
@@ -7,12 +10,11 @@ from scipy.interpolate import CubicSpline
 
 from lapwing.flights.log_import.column_mapping import load_mapping
 from lapwing.flights.log_import.csv_flight import from_columns, read_csv_flight
+from lapwing.flights.log_import.csv_table import read_columns
 from lapwing.flights.log_import.open_flight import open_flight
 from lapwing.flights.log_import.time_alignment import clock_drift, time_offset
 from lapwing.flights.rotation_arrays import from_ned_frd, from_vector, product, rotate, rotation_vector
 from lapwing.studies.validation.plant_rows import PlantRows
-
-pytestmark = pytest.mark.long
 
 
 @pytest.fixture(scope="module")
@@ -39,6 +41,7 @@ def read(path):
     return open_flight(path, "nanobench")
 
 
+@pytest.mark.long
 def test_columns_become_si_quantities(flight, path):
     result = read(path)
     assert result.position == pytest.approx(flight.position, abs=1e-8)
@@ -49,12 +52,14 @@ def test_columns_become_si_quantities(flight, path):
     assert result.valid.all()
 
 
+@pytest.mark.long
 def test_gzip_has_equal_recording(path, tmp_path):
     packed = tmp_path / "flight.csv.gz"
     packed.write_bytes(gzip.compress(path.read_bytes()))
     assert np.array_equal(read(packed).position, read(path).position)
 
 
+@pytest.mark.long
 def test_faulty_samples_are_marked_and_counted(path):
     edited(path, "motor_motor_m2", lambda k, v: "1938326" if k == 100 else v)
     edited(path, "pwr_pm_vbat", lambda k, v: "2.04" if 200 <= k < 203 else v)
@@ -67,6 +72,7 @@ def test_faulty_samples_are_marked_and_counted(path):
     assert result.valid.mean() > 0.95
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("column", "change", "message"),
     [
@@ -83,6 +89,7 @@ def test_wrong_values_are_named(path, column, change, message):
         read(path)
 
 
+@pytest.mark.long
 @pytest.mark.parametrize(
     ("column", "message"), [("motor_motor_m3", "no motor outputs"), ("vx", "column vx is missing")]
 )
@@ -92,12 +99,14 @@ def test_missing_column_is_named(path, column, message):
         read(path)
 
 
+@pytest.mark.long
 def test_file_without_rows_is_rejected(path):
     path.write_text(path.read_text().splitlines()[0] + "\n")
     with pytest.raises(ValueError, match="has no rows"):
         read(path)
 
 
+@pytest.mark.long
 def test_ned_frd_attitude_turns_about_same_axes():
     yaw_left_enu = from_ned_frd(from_vector(np.array([[0.0, 0.0, -0.3]])))
     level_north = from_ned_frd(np.array([[1.0, 0.0, 0.0, 0.0]]))
@@ -106,6 +115,7 @@ def test_ned_frd_attitude_turns_about_same_axes():
     assert rotation_vector(turned)[0] == pytest.approx([0.0, 0.0, 0.3], abs=1e-12)
 
 
+@pytest.mark.long
 def test_time_offset_of_shifted_stream():
     noise = np.random.default_rng(1).standard_normal((2000, 3))
     rate = np.apply_along_axis(lambda c: np.convolve(c, np.ones(9) / 9, "same"), 0, noise)
@@ -114,6 +124,7 @@ def test_time_offset_of_shifted_stream():
     assert score > 0.98
 
 
+@pytest.mark.long
 def test_clock_drift_of_stretched_stream():
     rng = np.random.default_rng(5)
     time = 0.01 * np.arange(12_000)
@@ -126,11 +137,13 @@ def test_clock_drift_of_stretched_stream():
     assert drift.standard_error < 20e-6
 
 
+@pytest.mark.long
 def test_clock_drift_of_short_stream_is_unknown():
     turning = np.random.default_rng(5).standard_normal((1_000, 3))
     assert clock_drift(turning, turning, np.ones(1_000, bool), 0.01) is None
 
 
+@pytest.mark.long
 def test_unknown_unit_is_named(tmp_path):
     text = '[time]\ncolumn = "t"\nunit = "fortnight"\n'
     mapping = tmp_path / "mine.toml"
@@ -139,6 +152,7 @@ def test_unknown_unit_is_named(tmp_path):
         load_mapping(str(mapping))
 
 
+@pytest.mark.long
 def test_real_flights_import_with_their_faults():
     folder = real_flights("nanobench")
     mapping = load_mapping("nanobench")
@@ -148,6 +162,7 @@ def test_real_flights_import_with_their_faults():
     assert 0.6 < result.valid.mean() < 0.9
 
 
+@pytest.mark.long
 def test_fast_csv_keeps_its_time_base(tmp_path):
     mapping = load_mapping("betaflight")
     n = 3200
@@ -159,3 +174,30 @@ def test_fast_csv_keeps_its_time_base(tmp_path):
     at = result.interval * np.arange(len(result))
     assert at[-1] == pytest.approx(time[-1] * 1e-6, abs=1e-3)
     assert result.omega[:, 0] == pytest.approx(np.radians(np.sin(at)), abs=1e-6)
+
+
+ROWS = [(0.0, 1.5, -2.25), (0.01, 1.75, -2.5)]
+PLAIN = "t,x,y\n" + "".join(",".join(map(str, row)) + "\n" for row in ROWS)
+DECIMAL = "t;x;y\n" + "".join(";".join(map(str, row)).replace(".", ",") + "\n" for row in ROWS)
+QUOTED = '"t","x","y"\n' + "".join(",".join(f'"{v}"'.replace(".", ",") for v in row) + "\n" for row in ROWS)
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        codecs.BOM_UTF8 + PLAIN.encode(), PLAIN.encode("utf-16"), PLAIN.replace(",", ";").encode(),
+        PLAIN.replace(",", "\t").encode(), DECIMAL.encode(), QUOTED.encode(), b"# of a logger\n" + PLAIN.encode(),
+        b"# " + PLAIN.encode(), PLAIN.replace("0.01", "# pause\n0.01").encode(),
+    ],
+    ids=["bom", "utf16", "semicolon", "tab", "decimal", "quoted", "comment", "header", "rows"],
+)  # fmt: skip
+def test_form_of_file_is_recognised(tmp_path, content):
+    (tmp_path / "f.csv").write_bytes(content)
+    table = read_columns(tmp_path / "f.csv", ("t", "x", "y"))
+    assert np.column_stack([table["t"], table["x"], table["y"]]) == pytest.approx(np.array(ROWS))
+
+
+def test_decimal_commas_between_commas_are_named(tmp_path):
+    (tmp_path / "f.csv").write_text("t,x\n0,0,1,5\n0,01,1,75\n")
+    with pytest.raises(ValueError, match="decimal commas are suspected; separate the fields by semicolons"):
+        read_columns(tmp_path / "f.csv", ("t", "x"))

@@ -1,7 +1,5 @@
 """Import of flights in the format of each autopilot, from files of independent writers."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import flight_writers
@@ -26,6 +24,7 @@ from lapwing.flights.flight_data import FlightData
 from lapwing.flights.log_import.dataflash_flight import read_dataflash_flight
 from lapwing.flights.log_import.open_flight import open_flight
 from lapwing.flights.rotation_arrays import conjugate, product, rotation_vector
+from tests.commands import run_command
 
 
 @pytest.mark.parametrize("name", WRITERS)
@@ -81,8 +80,7 @@ def test_setpoints_of_single_fields_are_read(tmp_path, flight, monkeypatch):
 @pytest.mark.long
 def test_imported_setpoints_are_in_the_log(tmp_path, flight):
     write_ulog(tmp_path / "f.ulg", flight)
-    done = run("import", tmp_path / "f.ulg", "--out", tmp_path / "f.mcap")
-    assert done.returncode == 0, done.stderr
+    done = run_command("import", tmp_path / "f.ulg", "--out", tmp_path / "f.mcap", code=0)
     assert "topics without a counterpart: vehicle_rates_setpoint\n" in done.stdout
     log = FlightData.read(tmp_path / "f.mcap")
     n = len(log.setpoint)
@@ -124,16 +122,11 @@ def test_betaflight_columns_become_si_quantities(tmp_path, flight):
     assert any("no position" in note for note in result.notes)
 
 
-def run(*arguments):
-    return subprocess.run([sys.executable, "-m", "lapwing", *map(str, arguments)], capture_output=True, text=True)
-
-
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["f.bin", "f.tlog", "log07", "bag"])
 def test_command_imports_format(tmp_path, flight, name):
     WRITERS[name](tmp_path / name, flight)
-    done = run("import", tmp_path / name, "--out", tmp_path / "out.mcap")
-    assert done.returncode == 0, done.stderr
+    run_command("import", tmp_path / name, "--out", tmp_path / "out.mcap", code=0)
     again = open_flight(tmp_path / "out.mcap")
     assert again.position == pytest.approx(flight.position[: len(again)], abs=2e-3)
 

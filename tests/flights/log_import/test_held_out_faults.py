@@ -16,7 +16,6 @@ from tests.flights.log_import.test_log_doubts import (
     GPS_FIELDS,
     JUMP,
     RANGE_FIELDS,
-    left_out,
     local,
 )
 
@@ -58,13 +57,6 @@ def test_quaternions_of_zeros_are_left_out(tmp_path, flight):
     assert "marked samples: no unit quaternion: 50" in output
     assert np.isfinite(result.attitude).all()
     assert len(result) == pytest.approx(SAMPLES - 52, abs=2)
-
-
-def test_counter_of_resets_wraps(tmp_path, flight):
-    flags = local(flight, lambda k: (1, 1, 1, 1, 255 if k < JUMP else 0), (0.02, 0.0, 0.0))
-    output, result = imported(write_ulog_topics(tmp_path / "f.ulg", flight, [flags]))
-    assert "marked samples: xy reset: 1" in output
-    left_out(result)
 
 
 def test_dropout_of_a_single_topic_is_left_out(tmp_path, flight):

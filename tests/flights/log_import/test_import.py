@@ -1,7 +1,5 @@
 import gzip
 import shutil
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -14,16 +12,13 @@ from lapwing.flights.log_import.recording import Recording
 from lapwing.flights.log_import.ulog_flight import read_ulog_flight
 from lapwing.flights.log_import.write_log import write_log
 from lapwing.studies.validation.plant_rows import PlantRows
+from tests.commands import assert_rejected, run_command
 from tests.fuzz.flights import dataflash
 
 
 @pytest.fixture(scope="module")
 def flight() -> Recording:
     return simulated(PlantRows("crazyflie_21", INTERVAL), 3.0, [1])[0]
-
-
-def run(*arguments):
-    return subprocess.run([sys.executable, "-m", "lapwing", *map(str, arguments)], capture_output=True, text=True)
 
 
 @pytest.mark.long
@@ -41,13 +36,11 @@ def test_imported_log_reads_back_as_same_recording(flight, tmp_path):
 @pytest.mark.long
 def test_command_writes_log_that_other_commands_read(flight, tmp_path):
     source, out = write_csv(tmp_path / "flight.csv", flight), tmp_path / "flight.mcap"
-    done = run("import", source, "--mapping", "nanobench", "--out", out)
-    assert done.returncode == 0, done.stderr
+    done = run_command("import", source, "--mapping", "nanobench", "--out", out, code=0)
     assert "against attitude" in done.stdout
-    reported = run("info", out)
-    assert reported.returncode == 0, reported.stderr
+    reported = run_command("info", out, code=0)
     assert "/drone1/ground_truth" in reported.stdout
-    assert run("report", out, "--out", tmp_path / "flight.html").returncode == 0
+    run_command("report", out, "--out", tmp_path / "flight.html", code=0)
 
 
 @pytest.mark.long
@@ -56,11 +49,9 @@ def test_import_without_room_leaves_former_log(flight, tmp_path):
     (tmp_path / "out").mkdir()
     out = tmp_path / "out" / "flight.mcap"
     out.write_text("former log")
-    command = [sys.executable, "-m", "lapwing", "import", str(source), "--mapping", "nanobench", "--out", str(out)]
-    done = subprocess.run(
-        ["sh", "-c", 'ulimit -f 2; exec "$@"', "sh", *command], capture_output=True, text=True, check=False
-    )
-    assert (done.returncode, done.stderr) == (2, f"lapwing: {out}: cannot write the log: File too large\n")
+    small = ["sh", "-c", 'ulimit -f 2; exec "$@"', "sh"]
+    done = run_command("import", source, "--mapping", "nanobench", "--out", out, within=small)
+    assert_rejected(done, f"lapwing: {out}: cannot write the log: File too large\n")
     assert {file.name: file.read_text() for file in out.parent.iterdir()} == {"flight.mcap": "former log"}
 
 
@@ -83,10 +74,7 @@ def broken(path, text):
 )
 def test_command_rejects_unreadable_files(tmp_path, name, content, message):
     path, out = broken(tmp_path / name, content), tmp_path / "out.mcap"
-    done = run("import", path, "--mapping", "nanobench", "--out", out)
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert done.stderr.count("\n") == 1
+    assert_rejected(run_command("import", path, "--mapping", "nanobench", "--out", out), message)
     assert not out.exists()
 
 
@@ -107,15 +95,11 @@ def test_flight_on_the_ground_is_reported_in_one_line(flight, tmp_path, height, 
         flight, position=np.full_like(flight.position, height), motor_voltage=share * flight.motor_voltage
     )
     source, out = write_csv(tmp_path / "flight.csv", grounded), tmp_path / "flight.mcap"
-    done = run("import", source, "--mapping", "nanobench", "--out", out)
-    assert done.returncode == 0, done.stderr
+    done = run_command("import", source, "--mapping", "nanobench", "--out", out, code=0)
     lines = [line for line in done.stdout.splitlines() if line.startswith("never leaves the ground")]
     assert len(lines) == 1
     assert reason in lines[0]
-    refused = run("validate", "crazyflie_21", out)
-    assert refused.returncode == 2
-    assert refused.stderr.count("\n") == 1
-    assert "leave the ground" in refused.stderr
+    assert_rejected(run_command("validate", "crazyflie_21", out), "leave the ground")
 
 
 def test_setpoint_of_csv_is_in_the_log(flight, tmp_path):
@@ -136,7 +120,7 @@ def test_damaged_dataflash_log_is_imported_without_lines_of_its_parser(tmp_path)
     log = bytearray(dataflash().seeds[0])
     log[700:760] = b"9" * 60
     (tmp_path / "a.bin").write_bytes(log)
-    result = run("import", tmp_path / "a.bin", "--out", tmp_path / "a.mcap")
+    result = run_command("import", tmp_path / "a.bin", "--out", tmp_path / "a.mcap")
     assert (result.returncode, result.stderr) == (0, "")
     assert "bad header" not in result.stdout
 
@@ -159,17 +143,15 @@ def test_log_of_imported_flight_repeats_it_and_keeps_its_gaps(flight, tmp_path):
     broken_flight = replace(flight, omega=flight.omega.copy())
     broken_flight.omega[150] = 60.0  # [rad/s] above the range of a gyroscope
     source, out = write_csv(tmp_path / "flight.csv", broken_flight), tmp_path / "imported.mcap"
-    done = run("import", source, "--mapping", "nanobench", "--out", out)
-    assert done.returncode == 0, done.stderr
+    done = run_command("import", source, "--mapping", "nanobench", "--out", out, code=0)
     original, imported = open_flight(source, "nanobench"), open_flight(out)
     assert 0 < (~original.valid).sum() < 10
     assert (imported.valid == original.valid).all()
     assert imported.repeats(original)
     assert original.repeats(imported)
-    done = run("validate", "crazyflie_21", out, source, "--mapping", "nanobench")
-    assert done.returncode == 0, done.stderr
+    done = run_command("validate", "crazyflie_21", out, source, "--mapping", "nanobench", code=0)
     assert "flight: the same flight as imported" in done.stdout
-    assert "lacks a scene, it is a recorded flight" in run("info", out).stdout
+    assert "lacks a scene, it is a recorded flight" in run_command("info", out).stdout
 
 
 @pytest.mark.long
@@ -182,14 +164,15 @@ def test_mapping_that_no_file_uses_is_rejected(flight, tmp_path, command):
         "validate": ("crazyflie_21", log),
         "identify": ("crazyflie_21", log, "--out", tmp_path / "out.toml", "--free", "airframe.mass.total"),
     }
-    done = run(command, *arguments[command], "--mapping", "nanobench")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert f"--mapping nanobench: {log} needs none" in done.stderr
+    assert_rejected(
+        run_command(command, *arguments[command], "--mapping", "nanobench"), f"--mapping nanobench: {log} needs none"
+    )
     assert [path.name for path in tmp_path.iterdir()] == ["flight.bin"]
 
 
 @pytest.mark.long
 def test_sensor_fit_checks_output_first(flight, tmp_path):
-    done = run("identify", "crazyflie_21", tmp_path, "--sensors", "--out", tmp_path / "none" / "a.toml")
-    assert (done.returncode, done.stderr.count("\n")) == (2, 1)
-    assert "there is no folder" in done.stderr
+    assert_rejected(
+        run_command("identify", "crazyflie_21", tmp_path, "--sensors", "--out", tmp_path / "none" / "a.toml"),
+        "there is no folder",
+    )

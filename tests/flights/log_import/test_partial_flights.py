@@ -1,8 +1,6 @@
 """Logs of flights without some quantities, through the commands that read logs."""
 
 import re
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -12,10 +10,7 @@ from flight_writers import GRAVITY, SAMPLES
 from lapwing.flights.flight_data import FlightData
 from lapwing.flights.log_import.open_flight import open_flight
 from lapwing.flights.rotation_arrays import to_euler
-
-
-def run(*arguments):
-    return subprocess.run([sys.executable, "-m", "lapwing", *map(str, arguments)], capture_output=True, text=True)
+from tests.commands import assert_rejected, run_command
 
 
 def write_blackbox(path, flight, offset=48.0, full_scale=1999.0, **others):
@@ -47,17 +42,15 @@ def test_flight_without_position_has_a_report(tmp_path, flight, attitude):
         tmp_path / "f.csv", flight, **dict(zip((" roll", " pitch", " heading"), angles, strict=bool(attitude)))
     )
     log = tmp_path / "f.mcap"
-    assert run("import", source, "--mapping", "betaflight", "--out", log).returncode == 0
+    run_command("import", source, "--mapping", "betaflight", "--out", log, code=0)
     for arguments in (("report", log), ("report", log, "--out", tmp_path / "f.pdf"), ("info", log)):
-        done = run(*arguments)
+        done = run_command(*arguments)
         assert (done.returncode, done.stderr) == (0, "")
     titles = shown(tmp_path / "f.html")
     assert {"Angular velocity", "Motors: speed, voltage and power", "Battery"} <= set(titles)
     assert ("Attitude" in titles) == attitude
     assert not {"Position", "Mission map", "Path from the side"} & set(titles)
-    refused = run("render", log, "--out", tmp_path / "f.png")
-    assert refused.returncode == 2
-    assert len(refused.stderr.splitlines()) == 1
+    assert_rejected(run_command("render", log, "--out", tmp_path / "f.png"))
 
 
 def test_unmeasured_quantities_of_a_log_are_nan(tmp_path, flight):

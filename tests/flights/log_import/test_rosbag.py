@@ -1,7 +1,5 @@
 """Imports of rosbag2 folders with setpoints, pulses of motors, and no throttles."""
 
-import subprocess
-import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -9,6 +7,7 @@ import pytest
 from flight_writers import GRAVITY, INTERVAL, SAMPLES
 
 from lapwing.flights.log_import.open_flight import open_flight
+from tests.commands import assert_rejected, run_command
 
 
 def write_bag(path, topics, storage="MCAP"):
@@ -105,31 +104,24 @@ def test_command_imports_database_with_and_without_metadata(tmp_path):
     (file,) = (tmp_path / "bag").glob("*.db3")
     heights = []
     for source in (tmp_path / "bag", file, file):
-        command = [sys.executable, "-m", "lapwing", "import", source, "--out", tmp_path / f"{len(heights)}.mcap"]
-        done = subprocess.run(command, capture_output=True, text=True)
-        assert done.returncode == 0, done.stderr
+        command = ["import", source, "--out", tmp_path / f"{len(heights)}.mcap"]
+        run_command(*command, code=0)
         heights.append(open_flight(command[-1]).position[:, 2])
         (tmp_path / "bag" / "metadata.yaml").unlink(missing_ok=True)
     assert heights[0] == pytest.approx(2.0)
     assert all(np.array_equal(each, heights[0], equal_nan=True) for each in heights)
     file.write_bytes(file.read_bytes()[:8192])
-    refused = subprocess.run(command, capture_output=True, text=True)
-    assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
-    assert f"{file.name}: is not a readable rosbag2" in refused.stderr
+    assert_rejected(run_command(*command), f"{file.name}: is not a readable rosbag2")
 
 
 @pytest.mark.long
 def test_command_selects_vehicle_of_bag(tmp_path):
     write_bag(tmp_path / "bag", FLEET)
-    command = [sys.executable, "-m", "lapwing", "import", tmp_path / "bag", "--out", tmp_path / "f.mcap"]
-    done = subprocess.run([*command, "--vehicle", "red"], capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
+    command = ["import", tmp_path / "bag", "--out", tmp_path / "f.mcap"]
+    run_command(*command, "--vehicle", "red", code=0)
     assert open_flight(tmp_path / "f.mcap").position[:, 2] == pytest.approx(2.0)
-    refused = subprocess.run(command, capture_output=True, text=True)
-    assert (refused.returncode, len(refused.stderr.splitlines())) == (2, 1)
-    log = [*command[:-3], tmp_path / "f.mcap", "--out", tmp_path / "g.mcap"]
-    refused = subprocess.run(log, capture_output=True, text=True)
-    assert "is a Lapwing log already; use it without import" in refused.stderr
+    assert_rejected(run_command(*command))
+    log = ["import", tmp_path / "f.mcap", "--out", tmp_path / "g.mcap"]
+    assert_rejected(run_command(*log), "is a Lapwing log already; use it without import")
     (tmp_path / "f.mcap").write_bytes(b"")
-    refused = subprocess.run(log, capture_output=True, text=True)
-    assert "f.mcap: is empty; expected a log (MCAP)" in refused.stderr
+    assert_rejected(run_command(*log), "f.mcap: is empty; expected a log (MCAP)")

@@ -1,14 +1,14 @@
 """Damaged and hostile FMU files are rejected in one line with exit code 2, before any of their code runs."""
 
 import struct
-import subprocess
-import sys
 import zipfile
 from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 from small_fmu import write_small_fmu
+
+from tests.commands import assert_rejected, run_command
 
 pytest.importorskip("fmpy")
 
@@ -48,17 +48,11 @@ def files(tmp_path_factory: pytest.TempPathFactory) -> Files:
         return {name: archive.read(name) for name in archive.namelist()}
 
 
-def assert_rejected(folder: Path, message: str) -> None:
+def assert_fmu_rejected(folder: Path, message: str) -> None:
     scene = folder / "bad.toml"
     scene.write_text(HOVER.read_text() + SERVICE)
-    done = subprocess.run(
-        [sys.executable, "-m", "lapwing", "run", str(scene), "--allow-code", "--log", str(folder / "a.mcap")],
-        capture_output=True, text=True, check=False,
-    )  # fmt: skip
-    assert done.returncode == 2, done.stderr
-    assert "services.motor.fmu: " in done.stderr
-    assert message in done.stderr
-    assert done.stderr.count("\n") == 1
+    done = run_command("run", scene, "--allow-code", "--log", folder / "a.mcap")
+    assert_rejected(done, "services.motor.fmu: ", message)
     assert not (folder / "a.mcap").exists()
 
 
@@ -87,7 +81,7 @@ def test_hostile_fmu_is_rejected_in_one_line(
     with zipfile.ZipFile(tmp_path / "bad.fmu", "w") as archive:
         for name, content in change(files).items():
             archive.writestr(name, content)
-    assert_rejected(tmp_path, message)
+    assert_fmu_rejected(tmp_path, message)
 
 
 def test_fmu_that_unpacks_beyond_limit_is_rejected_in_one_line(tmp_path: Path, files: Files) -> None:
@@ -99,13 +93,13 @@ def test_fmu_that_unpacks_beyond_limit_is_rejected_in_one_line(tmp_path: Path, f
         for k in range(4):
             archive.writestr(f"resources/{k}", b"x")
             archive.filelist[-1].file_size = 1_500_000_000
-    assert_rejected(tmp_path, "its files have 6 GB; expected at most 4 GB")
+    assert_fmu_rejected(tmp_path, "its files have 6 GB; expected at most 4 GB")
 
 
 def test_large_file_is_not_read(tmp_path: Path) -> None:
     with (tmp_path / "bad.fmu").open("wb") as file:
         file.truncate(5_000_000_000)  # without blocks on the disk
-    assert_rejected(tmp_path, "has 5 GB; expected at most 4 GB")
+    assert_fmu_rejected(tmp_path, "has 5 GB; expected at most 4 GB")
 
 
 @pytest.mark.long
@@ -120,6 +114,6 @@ def test_damaged_fmu_member_is_rejected_in_one_line(tmp_path: Path, files: Files
         content = bytearray(whole)
         content[place] ^= 0xFF
         path.write_bytes(content)
-        assert_rejected(tmp_path, f"file {name} is damaged; expected a complete FMU")
+        assert_fmu_rejected(tmp_path, f"file {name} is damaged; expected a complete FMU")
     path.write_bytes(content[: len(content) // 2])
-    assert_rejected(tmp_path, "not an FMU: File is not a zip file")
+    assert_fmu_rejected(tmp_path, "not an FMU: File is not a zip file")

@@ -1,8 +1,6 @@
 """Outputs of FMUs as named inputs of effects: battery, motors and wind, through the command `lapwing run`."""
 
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +16,7 @@ from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.fmi.export.exported_part import export_part
 from lapwing.fmi.export.variables import variables_of
 from lapwing.services import scene_resolver
+from tests.commands import assert_rejected, run_command
 
 HOVER = Path("lapwing/scenes/hover.toml").resolve()
 EFFECTS = """
@@ -51,10 +50,6 @@ MEASURED = "\n".join(
 FULL_PACK = "open_circuit = 49.0, resistance = 0.0"
 
 
-def run_command(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", "lapwing", *arguments], capture_output=True, text=True, check=False)
-
-
 def motor_constants() -> str:
     """Return start values of motors without friction: torque e K (V - K w) / R."""
     motor = load_airframe("lapwing/scenes/vehicles/delivery_drone.toml").motor
@@ -74,11 +69,9 @@ def scene_with(folder: Path, outputs: str, pack: str = FULL_PACK, wind: str = "[
 
 def fly(scene: Path, log: Path, mode: str = "single-process", rate: int = 250) -> str:
     done = run_command(
-        "run", str(scene), "--allow-code", "--mode", mode, "--log", str(log), "--set", "run.duration=1.0",
+        "run", scene, "--allow-code", "--mode", mode, "--log", log, "--set", "run.duration=1.0",
         "--set", "success.require=[]", "--set", "airframe.motor.no_load_current=0.0",
-        "--set", f"communication.rate={rate}",
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+        "--set", f"communication.rate={rate}", code=0)  # fmt: skip
     digest = re.search(r"digest\s+(\w+)", done.stdout)
     assert digest
     return digest[1]
@@ -179,20 +172,17 @@ def test_modes_campaign_and_resimulation_have_equal_bits(folder: Path) -> None:
     scene, log, campaign = scene_with(folder, ALL), folder / "bits.mcap", str(folder / "campaign")
     assert fly(scene, log) == fly(scene, folder / "bits_processes.mcap", mode="multi-process")
     options = ["--set", "run.duration=1.0", "--set", "success.require=[]"]
-    done = run_command("campaign", str(scene), "--runs", "1", "--out", campaign, *options)
-    assert done.returncode == 2
+    done = run_command("campaign", scene, "--runs", "1", "--out", campaign, *options, code=2)
     assert done.stderr.endswith("use --allow-code to run it\n")
     done = run_command(
-        "campaign", str(scene), "--runs", "2", "--workers", "2", "--out", campaign, "--allow-code", *options
+        "campaign", scene, "--runs", "2", "--workers", "2", "--out", campaign, "--allow-code", *options, code=0
     )
-    assert done.returncode == 0, done.stderr
     done = run_command(
-        "run", str(scene), "--campaign", campaign, "--run", "1", "--allow-code", "--mode", "single-process", "--log",
-        str(folder / "run1.mcap"),
+        "run", scene, "--campaign", campaign, "--run", "1", "--allow-code", "--mode", "single-process", "--log",
+        folder / "run1.mcap",
     )  # fmt: skip
     assert "final state bit-for-bit identical" in done.stdout, done.stderr
-    done = run_command("resimulate", str(log), "--allow-code")
-    assert done.returncode == 0, done.stderr
+    done = run_command("resimulate", log, "--allow-code", code=0)
     assert "is identical" in done.stdout
 
 
@@ -217,19 +207,17 @@ def test_exported_plant_has_named_inputs(folder: Path) -> None:
     ],
 )
 def test_invalid_effect_input_is_rejected_in_one_line(folder: Path, outputs: str, message: str) -> None:
-    done = run_command("run", str(scene_with(folder, outputs)), "--allow-code", "--log", str(folder / "x.mcap"))
-    assert done.returncode == 2
-    assert done.stderr.startswith("lapwing: ")
-    assert "services.parts.outputs" in done.stderr
-    assert message in done.stderr
-    assert done.stderr.count("\n") == 1
+    assert_rejected(
+        run_command("run", scene_with(folder, outputs), "--allow-code", "--log", folder / "x.mcap"),
+        "services.parts.outputs",
+        message,
+    )
 
 
 def test_effect_input_cannot_be_read(folder: Path) -> None:
     scene = scene_with(folder, SUPPLY)
     scene.write_text(scene.read_text().replace("truth.motor_current.0", "effect.battery.voltage"))
-    done = run_command("run", str(scene), "--allow-code", "--log", str(folder / "x.mcap"))
-    assert done.returncode == 2
+    done = run_command("run", scene, "--allow-code", "--log", folder / "x.mcap", code=2)
     assert "services.parts.inputs.current_0: unknown port 'effect.battery'" in done.stderr
 
 
@@ -238,10 +226,10 @@ def test_model_without_multirotor_effects_is_rejected(folder: Path) -> None:
     scene = folder / "gyrostat.toml"
     gyrostat = Path("lapwing/scenes/gyrostat_attitude.toml").resolve().read_text()
     scene.write_text(gyrostat + PARTS.format(outputs=SUPPLY, inputs="", start=FULL_PACK))
-    done = run_command("run", str(scene), "--allow-code", "--log", str(folder / "x.mcap"))
-    assert done.returncode == 2
-    assert "the scene has no effect battery" in done.stderr
-    assert done.stderr.count("\n") == 1
+    assert_rejected(
+        run_command("run", scene, "--allow-code", "--log", folder / "x.mcap"),
+        "the scene has no effect battery",
+    )
 
 
 def test_batch_without_fmus_rejects_scene(folder: Path) -> None:

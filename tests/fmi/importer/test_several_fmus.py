@@ -15,6 +15,7 @@ from small_fmu import write_small_fmu
 pytest.importorskip("fmpy")
 
 from lapwing import read_log
+from tests.commands import run_command
 
 HOVER = Path("lapwing/scenes/hover.toml").resolve()
 FILTER, MOTOR = "trajectory.position_world.2", "actuators.motor_voltage.0"
@@ -39,10 +40,6 @@ HANG = 2
 OPTIONS = "--allow-code", "--set", "run.duration=1.0", "--set", "success.require=[]"
 
 
-def run_command(*arguments: str) -> subprocess.CompletedProcess[str]:
-    return subprocess.run([sys.executable, "-m", "lapwing", *arguments], capture_output=True, text=True, check=False)
-
-
 def scene_with(
     folder: Path,
     gain: float = 1.0,
@@ -58,8 +55,7 @@ def scene_with(
 
 
 def fly(scene: Path, log: Path, mode: str = "single-process") -> None:
-    done = run_command("run", str(scene), "--mode", mode, "--log", str(log), *OPTIONS)
-    assert done.returncode == 0, done.stderr
+    run_command("run", scene, "--mode", mode, "--log", log, *OPTIONS, code=0)
 
 
 @pytest.fixture(scope="module")
@@ -93,8 +89,7 @@ def test_fmu_reads_port_of_lapwing_or_of_other_fmu(folder: Path, source: str, ga
 
 def test_algebraic_loop_through_fmu_is_rejected_in_one_line(folder: Path) -> None:
     scene = scene_with(folder, filter_input=MOTOR)
-    done = run_command("run", str(scene), "--log", str(folder / "loop.mcap"), *OPTIONS)
-    assert done.returncode == 2
+    done = run_command("run", scene, "--log", folder / "loop.mcap", *OPTIONS, code=2)
     message = "an algebraic loop through autopilot, filter_fmu; expected delay = 1"
     assert f"services.filter.delay: {message}" in done.stderr
     assert done.stderr.count("\n") == 1

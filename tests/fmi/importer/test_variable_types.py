@@ -1,7 +1,6 @@
 """Variables that ports of numbers cannot hold: texts, bytes and clocks, on FMUs through the command `lapwing run`."""
 
 import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,6 +11,7 @@ from small_fmu import write_small_fmu
 pytest.importorskip("fmpy")
 
 from lapwing import read_log
+from tests.commands import assert_rejected, run_command
 
 HOVER = Path("lapwing/scenes/hover.toml").resolve()
 SERVICE = """
@@ -30,14 +30,7 @@ def fly(folder: Path, column: str, output: str, inputs: str = "", start: str = "
     scene = folder / "a.toml"
     scene.write_text(HOVER.read_text() + SERVICE.format(column=column, output=output, inputs=inputs, start=start))
     arguments = ["--mode", "single-process", "--set", "run.duration=0.4", "--set", "success.require=[]"]
-    command = [sys.executable, "-m", "lapwing", "run", str(scene), "--allow-code", "--log", str(folder / "a.mcap")]
-    return subprocess.run([*command, *arguments], capture_output=True, text=True, check=False)
-
-
-def assert_rejected(done: subprocess.CompletedProcess[str], message: str) -> None:
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert done.stderr.count("\n") == 1
+    return run_command("run", scene, "--allow-code", "--log", folder / "a.mcap", *arguments)
 
 
 def test_text_is_start_value(tmp_path: Path) -> None:

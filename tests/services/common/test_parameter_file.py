@@ -1,7 +1,5 @@
 """Parameter files: saved from a scene or a run, read back, rejected in one line."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -12,14 +10,10 @@ from lapwing.runs.single_process_run import fly_single
 from lapwing.services.autopilot.parameter_file import read, write
 from lapwing.services.common.autopilot_parameters import table
 from lapwing.services.scene_resolver import load, resolve
+from tests.commands import assert_rejected, run_command
 
 HOVER = Path("lapwing/scenes/hover.toml")
 OPERATED = ["autopilot.accept_commands=true", "autopilot.follow_trajectory=false", "run.duration=1.0"]
-
-
-def lapwing(*arguments):
-    command = [sys.executable, "-m", "lapwing", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True, timeout=120, check=False)
 
 
 def test_parameter_file_round_trip(tmp_path):
@@ -67,8 +61,7 @@ def test_final_parameters_of_run_are_saved(tmp_path):
     }
     log, saved = tmp_path / "run.mcap", tmp_path / "after.params"
     fly_single(resolve(load(HOVER, OPERATED)), log, operator=lambda tick: values.get(tick, ()))
-    result = lapwing("parameters", log, "--save", saved)
-    assert result.returncode == 0, result.stderr
+    result = run_command("parameters", log, "--save", saved, code=0)
     after = read(saved)
     assert (after["MPC_XY_CRUISE"], after["NAV_DLL_ACT"]) == (3.5, 3.0)
     assert "MPC_XY_CRUISE    3.5" in result.stdout
@@ -77,15 +70,13 @@ def test_final_parameters_of_run_are_saved(tmp_path):
 
 @pytest.mark.long
 def test_scene_without_autopilot_has_no_parameters(tmp_path):
-    result = lapwing("parameters", "lapwing/scenes/os4_motors.toml")
-    assert (result.returncode, result.stderr.count("\n")) == (2, 1)
-    assert "no autopilot" in result.stderr
+    assert_rejected(run_command("parameters", "lapwing/scenes/os4_motors.toml"), "no autopilot")
 
 
 @pytest.mark.long
 def test_command_takes_name_of_shipped_scene(tmp_path):
     saved = tmp_path / "hover.params"
-    result = lapwing("parameters", "hover", "--save", saved)
+    result = run_command("parameters", "hover", "--save", saved)
     assert (result.returncode, result.stderr) == (0, "")
     assert read(saved) == {name: p.default for name, p in table(load(HOVER)).items()}
 
@@ -96,6 +87,4 @@ def test_command_takes_name_of_shipped_scene(tmp_path):
     [("hovr", "unknown scene 'hovr'"), ("missing.mcap", "cannot be read: no such file or directory; expected a log")],
 )
 def test_command_rejects_missing_scene_or_log_in_one_line(file, message):
-    result = lapwing("parameters", file)
-    assert (result.returncode, result.stderr.count("\n")) == (2, 1)
-    assert message in result.stderr
+    assert_rejected(run_command("parameters", file), message)

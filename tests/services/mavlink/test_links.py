@@ -1,7 +1,9 @@
-"""Links: frames in pieces over TCP and a serial line, rate limit and jitter."""
+"""Links: frames in pieces over TCP and a serial line, rate limit, jitter, watch of sockets."""
 
 import os
 import pty
+import queue
+import selectors
 import socket
 import time
 
@@ -11,6 +13,7 @@ from fake_vehicle import flying, free_port, until
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.link_server import Pacing
 from lapwing.services.mavlink.links.link import Budget
+from lapwing.services.mavlink.service import SocketWatch
 
 
 def frame():
@@ -72,3 +75,33 @@ def test_jitter_and_lag_of_telemetry_steps():
     assert pacing.jitter() == pytest.approx([0.0, 0.005, 0.005])
     assert pacing.behind() == pytest.approx(0.005)
     assert "no real-time factor" in Pacing(None).report()
+
+
+def test_watch_wakes_once_until_resumed():
+    wakes = queue.SimpleQueue()
+    near, far = socket.socketpair()
+    with near, far, selectors.DefaultSelector() as selector:
+        selector.register(near, selectors.EVENT_READ, lambda: near.recv(16))
+        with SocketWatch(selector, lambda: wakes.put(None)) as watch:
+            for _ in range(3):
+                assert not watch.ready
+                far.send(b"data")
+                wakes.get(timeout=600.0)
+                assert watch.ready
+                assert wakes.empty()
+                for key, _ in selector.select(0.0):
+                    key.data()
+                watch.resume()
+
+
+def test_watch_ends_while_ready_socket_has_not_been_read():
+    wakes = queue.SimpleQueue()
+    near, far = socket.socketpair()
+    with near, far, selectors.DefaultSelector() as selector:
+        selector.register(near, selectors.EVENT_READ)
+        with SocketWatch(selector, lambda: wakes.put(None)):
+            far.send(b"data")
+            wakes.get(timeout=600.0)
+        with SocketWatch(selector, lambda: wakes.put(None)):
+            pass
+        assert selector.get_map().keys() == {near.fileno()}

@@ -15,6 +15,7 @@ from lapwing.cosim.log import LogReader
 from lapwing.messages import OperatorInput
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.mavlink.signing import read_key
+from tests.commands import assert_rejected, run_command
 
 pytestmark = pytest.mark.long
 
@@ -127,16 +128,6 @@ def test_http_post_to_tcp_link_is_closed_and_does_not_arm(tmp_path):
     assert commands(process.log) <= {"link"}
 
 
-def test_command_before_heartbeat_is_denied(tmp_path):
-    port = free_port()
-    with run(tmp_path, "silent", "--mavlink", f"udpin:127.0.0.1:{port}") as process:
-        Station(f"udpout:127.0.0.1:{port}").await_vehicle(process)
-        silent = Station(f"udpout:127.0.0.1:{port}")
-        assert silent.command(ARM, 1.0, 21196.0) == mavlink.MAV_RESULT_DENIED
-        silent.link.mav.heartbeat_send(6, 8, 0, 0, 0)
-        assert silent.command(ARM, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
-
-
 @pytest.mark.parametrize(
     "kind", ["mavlink", *(pytest.param(k, marks=pytest.mark.nightly) for k in ("foxglove", "ros2", "time stamps"))]
 )
@@ -151,11 +142,7 @@ def test_link_that_cannot_start_ends_run_before_take_off(tmp_path, key, kind):
             "time stamps": ["--mavlink", "udpout:127.0.0.1:14999", "--mavlink-key", str(key)],
         }[kind]
         log = tmp_path / "flight.mcap"
-        command = [sys.executable, "-m", "lapwing", "run", "hover", *options, "--log", str(log)]
-        environment = {"XDG_STATE_HOME": str(tmp_path / "file")} if kind == "time stamps" else {}
-        command = ["env", *(f"{k}={v}" for k, v in environment.items()), *command, "--key-prefix", "test-no-start"]
-        done = subprocess.run(command, capture_output=True, text=True, timeout=600)
-    assert done.returncode == 2, done.stdout + done.stderr
-    assert len(done.stderr.splitlines()) == 1, done.stderr
-    assert options[0] in done.stderr
+        values = {"XDG_STATE_HOME": str(tmp_path / "file")} if kind == "time stamps" else {}
+        words = ["run", "hover", *options, "--log", log, "--key-prefix", "test-no-start"]
+        assert_rejected(run_command(*words, **values), options[0])
     assert not log.exists()

@@ -1,6 +1,5 @@
 """MAVLink process of a run: telemetry and commands; it can neither stop nor slow the flight."""
 
-import math
 import os
 import re
 import signal
@@ -51,42 +50,6 @@ def next_message(connection, kind, seconds=120.0):
     message = connection.recv_match(type=kind, blocking=True, timeout=seconds)
     assert message, f"no {kind}"
     return message
-
-
-def test_client_flies_autopilot_of_live_run(tmp_path):
-    port = free_port()
-    station = mavutil.mavlink_connection(f"udpin:127.0.0.1:{port}")
-
-    def send_command(number, *params):
-        station.mav.command_long_send(1, 1, number, 0, *params, *[math.nan] * (7 - len(params)))
-        while (ack := next_message(station, "COMMAND_ACK")).command != number:
-            pass
-        return ack.result
-
-    sets = ("autopilot.follow_trajectory=false", "autopilot.parameters.MIS_TAKEOFF_ALT=1.5", "run.duration=900")
-    more = [part for each in sets for part in ("--set", each)]
-    url = f"udpout:127.0.0.1:{port}"
-    with run(tmp_path, "test-mavlink", "--mavlink", url, "--speed", "5", *more) as process:
-        next_message(station, "HEARTBEAT")
-        station.mav.heartbeat_send(6, 8, 0, 0, 0)
-        assert next_message(station, "SYS_STATUS").onboard_control_sensors_health & mavlink.MAV_SYS_STATUS_SENSOR_GPS
-        station.mav.param_request_read_send(1, 1, b"MIS_TAKEOFF_ALT", -1)
-        assert next_message(station, "PARAM_VALUE").param_value == 1.5
-        assert (
-            send_command(mavlink.MAV_CMD_DO_SET_MODE, 1.0, 6.0, 0.0) != mavlink.MAV_RESULT_ACCEPTED
-        )  # no setpoints arrive
-        assert send_command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0) == mavlink.MAV_RESULT_ACCEPTED
-        assert send_command(mavlink.MAV_CMD_NAV_TAKEOFF) == mavlink.MAV_RESULT_ACCEPTED
-        while next_message(station, "GLOBAL_POSITION_INT").relative_alt < 1400:
-            pass
-        assert send_command(mavlink.MAV_CMD_NAV_LAND) == mavlink.MAV_RESULT_ACCEPTED
-        while next_message(station, "HEARTBEAT").base_mode & mavlink.MAV_MODE_FLAG_SAFETY_ARMED:
-            pass
-        process.send_signal(signal.SIGINT)
-        output, _ = process.communicate(timeout=600)
-    station.close()
-    assert process.returncode == 0, output  # it was ended after its landing
-    assert re.search(r"mavlink: telemetry: jitter median [\d.]+ ms, p99 [\d.]+ ms", output)
 
 
 @pytest.mark.skipif(not Path("/proc/self/task").exists(), reason="finds processes in /proc")
@@ -165,6 +128,7 @@ def test_flood_leaves_flight_bit_for_bit_identical(tmp_path):
     assert process.returncode == 0, output
     assert sent > 10_000  # 100 000 a second on an idle machine
     assert re.search(r"\d+ above the rate limit", output), output
+    assert re.search(r"mavlink: telemetry: jitter median [\d.]+ ms, p99 [\d.]+ ms", output)
     quiet = tmp_path / "quiet.mcap"
     fly_single(resolve(load(HOVER, ["autopilot.accept_commands=true"])), quiet)
     with LogReader(tmp_path / "test-mavlink-flood.mcap") as flooded, LogReader(quiet) as read:

@@ -1,12 +1,10 @@
 """Missions and parameters over a lossy link: one in ten datagrams is lost in each direction, one in ten doubled."""
 
-import socket
 import struct
-import threading
 
 import pytest
 from adapter_harness import Bench, Station, item
-from fake_vehicle import PARAMETERS, flying, free_port, until
+from fake_vehicle import PARAMETERS
 
 from lapwing.services.common.mavlink.dialect import mavlink
 
@@ -280,60 +278,3 @@ def test_parameter_out_of_bounds_is_rejected_with_value(value):
     assert client.last("PARAM_VALUE").param_value == 2.5
     client.send("param_request_read", 1, 1, b"NO_SUCH", -1)
     assert client.last("PARAM_ERROR").error == mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST
-
-
-def test_mavsdk_uploads_mission_over_lossy_udp():
-    mission_raw = pytest.importorskip("mavsdk.mission_raw", reason="mavsdk is not installed: pip install -e .[clients]")
-    import asyncio
-
-    import mavsdk
-
-    near, far, over = free_port(), free_port(), threading.Event()
-    relay = threading.Thread(target=lossy_relay, args=(near, far, over), daemon=True)
-
-    async def tell(running):
-        drone = mavsdk.System(port=free_port(socket.SOCK_STREAM))
-        await drone.connect(system_address=f"udpin://127.0.0.1:{far}")
-        async for state in drone.core.connection_state():
-            if state.is_connected:
-                break
-        items = [mission_raw.MissionItem(k, *item(k)[3:5], int(k == 0), 1, *item(k)[7:]) for k in range(20)]
-        await drone.mission_raw.upload_mission(items)
-        down = await drone.mission_raw.download_mission()
-        assert [(i.x, i.z) for i in down] == [(i.x, i.z) for i in items]
-        drone._stop_mavsdk_server()
-
-    with flying(f"udpout:127.0.0.1:{near}") as running:
-        relay.start()
-        asyncio.run(asyncio.wait_for(tell(running), 60.0))
-        assert until(lambda: len(running.vehicle.items) == 20)
-    over.set()
-    relay.join(5.0)
-
-
-def lossy_relay(near, far, over):
-    """Forward datagrams between two ports; some are lost, some are doubled."""
-    station = Station.__new__(Station)
-    import random
-
-    station.random, station.loss, station.twice = random.Random(1), 0.1, 0.1
-    inner, outer = (socket.socket(socket.AF_INET, socket.SOCK_DGRAM) for _ in range(2))
-    inner.bind(("127.0.0.1", near))
-    vehicle = None
-    for s in (inner, outer):
-        s.settimeout(0.002)
-    while not over.is_set():
-        for source in (inner, outer):
-            try:
-                data, address = source.recvfrom(2048)
-            except OSError:
-                continue
-            if source is inner:
-                vehicle = address
-            for _ in range(station._times()):
-                if source is inner:
-                    outer.sendto(data, ("127.0.0.1", far))
-                elif vehicle:
-                    inner.sendto(data, vehicle)
-    inner.close()
-    outer.close()

@@ -1,14 +1,13 @@
-"""Description of a vehicle from a scene and a log, and import rules of the service."""
-
-import ast
-from pathlib import Path
+"""Description of a vehicle from a scene, and its type."""
 
 import pytest
 
+from lapwing.services.mavlink.px4_facts import px4_facts
 from lapwing.services.mavlink.resolve import describe, resolve
+from lapwing.services.mavlink.telemetry.system_status import heartbeat
+from lapwing.services.mavlink.vehicle_cache import VehicleCache
+from lapwing.services.mavlink.vehicle_description import Rotor, VehicleDescription
 from lapwing.services.scene_resolver import load
-
-FOLDER = Path("services/mavlink")
 
 
 def test_vehicle_of_scene_is_described():
@@ -40,59 +39,10 @@ def test_unknown_firmware_error_lists_choices():
         firmware.get("px")
 
 
-SCENE = (
-    "lapwing.cosim.scene",
-    *(f"lapwing.services.common.{name}" for name in ("sections", "exchange", "vehicle", "modules")),
-)
-
-
-def imports(path):
-    for node in ast.walk(ast.parse(path.read_text())):
-        if isinstance(node, ast.ImportFrom):
-            yield from (f"{node.module}.{name.name}" for name in node.names)
-        elif isinstance(node, ast.Import):
-            yield from (name.name for name in node.names)
-
-
-def test_only_description_imports_scene():
-    for path in FOLDER.rglob("*.py"):
-        if path.name not in ("resolve.py", "schema.py"):
-            result = {n for n in imports(path) if n.startswith(SCENE)}
-            assert not result, path
-
-
-def test_handlers_and_telemetry_import_no_adapter():
-    for path in (*FOLDER.glob("protocols/*.py"), *FOLDER.glob("telemetry/*.py")):
-        assert not {n for n in imports(path) if ".adapter" in n or ".link_server" in n or ".endpoint" in n}, path
-
-
-def test_no_import_for_type_hints_only():
-    for path in FOLDER.rglob("*.py"):
-        assert "TYPE_CHECKING" not in path.read_text(), path
-
-
-def test_no_import_cycles():
-    modules = {
-        str(path.with_suffix("")).replace("/", ".").removesuffix(".__init__"): path for path in FOLDER.rglob("*.py")
-    }
-
-    def named(full):
-        return full if full in modules else full.rpartition(".")[0]
-
-    edges = {name: {named(i) for i in imports(path)} & set(modules) - {name} for name, path in modules.items()}
-
-    def visit(name, way):
-        assert name not in way, " -> ".join([*way, name])
-        for other in edges[name]:
-            visit(other, [*way, name])
-
-    for name in modules:
-        visit(name, [])
-
-
-def test_private_members_stay_private():
-    for path in FOLDER.rglob("*.py"):
-        for node in ast.walk(ast.parse(path.read_text())):
-            if isinstance(node, ast.Attribute) and node.attr.startswith("_") and not node.attr.startswith("__"):
-                owner = getattr(node.value, "id", "")
-                assert owner in ("self", "cls"), f"{path}: {owner}.{node.attr}"
+@pytest.mark.parametrize(("rotors", "kind", "frame"), [(4, 2, 4001), (6, 13, 6001), (8, 14, 8001), (5, 43, 4001)])
+def test_heartbeat_and_parameters_agree_on_vehicle_type(rotors, kind, frame):
+    """Compare with the numbers of MAVLink's common.xml and PX4's airframe reference."""
+    description = VehicleDescription(rotors=(Rotor((0.0, 0.0, 0.0), True),) * rotors)
+    facts = {fact.name: fact.value({}) for fact in px4_facts(description)}
+    assert heartbeat(VehicleCache(description)).type == facts["MAV_TYPE"] == kind
+    assert facts["SYS_AUTOSTART"] == frame

@@ -12,48 +12,20 @@ from lapwing.dynamics.lie.quaternion import rotate
 from lapwing.services.scene_resolver import from_resolved, load, parse, resolve
 from tests.cosim.memory_log import fly
 from tests.cosim.test_agreement import fly_apart
+from tests.scenes import head, phase, vehicle
 
 pytestmark = pytest.mark.long
 
-COMMON = """  # the effects of the scene `carried_load`
-[run]
-duration = 7.0
-[effects.gravity]
-[effects.air_density]
-[effects.rotor_thrust]
-[effects.ground_contact]
-[effects.body_drag]
-[effects.wind_constant]
-velocity = [0.0, 0.0, 0.0]
-{load}
-[autopilot]
-gains = "tuned"
-estimator = "ground_truth"
-[[trajectory.phase]]
-name = "climb"
-x = {{ kind = "minimum_jerk", to = 2.0, duration = 5.0 }}
-z = {{ kind = "minimum_jerk", to = 4.0, duration = 5.0 }}
-[[trajectory.phase]]
-name = "hold"
-duration = 10.0
-{vehicles}
-"""
+EFFECTS = {"wind_constant": "velocity = [0.0, 0.0, 0.0]"}  # with those below the effects of the scene `carried_load`
+CLIMB = phase("climb", 5.0, "trajectory", x=2.0, z=4.0) + phase("hold", 10.0, "trajectory")
+COMMON = head(7.0, "air_density", "body_drag", **EFFECTS) + CLIMB
 CABLE = "mass = 2.0\nlength = 2.0\ndrag_area = 0.05\nhook = [0.1, 0.0, -0.1]\n"
 SHARED = f"[effects.shared_slung_load]\n{CABLE}"
-TWO = """
-[[vehicle]]
-name = "left"
-airframe = "delivery_drone"
-initial_position = [0.0, 1.0]
-[[vehicle]]
-name = "right"
-airframe = "delivery_drone"
-initial_position = [0.0, -1.0]
-"""
+TWO = vehicle("left", start=(0.0, 1.0)) + vehicle("right", start=(0.0, -1.0))
 
 
 def two_carriers(tmp_path, *overrides):
-    return parse(tmp_path / "two.toml", COMMON.format(load=SHARED, vehicles=TWO), overrides)
+    return parse(tmp_path / "two.toml", COMMON + SHARED + TWO, overrides)
 
 
 @pytest.fixture(scope="module")
@@ -71,8 +43,8 @@ def test_one_carrier_equals_slung_load_model(tmp_path):
     alone = '[vehicle]\nairframe = "delivery_drone"\n'
     together = alone + 'model = "slung_load"\n'
     scenes = (
-        COMMON.format(load=SHARED, vehicles=alone),
-        COMMON.format(load=f"[slung_load]\n{CABLE}", vehicles=together),
+        COMMON + SHARED + alone,
+        COMMON + f"[slung_load]\n{CABLE}" + together,
     )
     beside, one = (fly(resolve(parse(tmp_path / "one.toml", text))) for text in scenes)
     loads = [log.view("body_states").position[:, 0] for log in (beside, one)]

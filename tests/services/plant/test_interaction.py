@@ -8,41 +8,11 @@ from lapwing.cosim.diagram.multi_vehicle import members
 from lapwing.services.scene_resolver import from_resolved, parse, reseed, resolve
 from tests.cosim.memory_log import fly
 from tests.cosim.test_agreement import fly_apart
+from tests.scenes import head, phase, vehicle
 
-SCENE = """  # the effects of the scene `formation`
-[run]
-duration = 4.0
-[effects.gravity]
-[effects.air_density]
-[effects.rotor_thrust]
-[effects.axial_inflow]
-[effects.body_drag]
-[effects.ground_contact]
-[effects.downwash]
-[effects.collision]
-[autopilot]
-gains = "tuned"
-estimator = "ground_truth"
-[[vehicle]]
-name = "above"
-airframe = "delivery_drone"
-[[vehicle.trajectory.phase]]
-name = "up"
-z = { kind = "minimum_jerk", to = 4.0, duration = 2.0 }
-[[vehicle.trajectory.phase]]
-name = "over"
-y = { kind = "minimum_jerk", to = 3.0, duration = 2.0 }
-[[vehicle]]
-name = "below"
-airframe = "delivery_drone"
-initial_position = [0.0, 3.0]
-[[vehicle.trajectory.phase]]
-name = "up"
-z = { kind = "minimum_jerk", to = 1.0, duration = 2.0 }
-[[vehicle.trajectory.phase]]
-name = "wait"
-duration = 10.0
-"""
+EFFECTS = ("air_density", "axial_inflow", "body_drag", "downwash", "collision")  # those of the scene `formation`
+ABOVE = vehicle("above", phase("up", 2.0, z=4.0), phase("over", 2.0, y=3.0))
+SCENE = head(4.0, *EFFECTS) + ABOVE + vehicle("below", phase("up", 2.0, z=1.0), phase("wait", 10.0), start=(0.0, 3.0))
 
 
 def scene(tmp_path, *overrides):

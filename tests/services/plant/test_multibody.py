@@ -1,7 +1,6 @@
 """Plant model `multibody`: scene tables, propeller failures, and the climb of the rigid-body model."""
 
 import math
-import re
 from pathlib import Path
 
 import pytest
@@ -84,25 +83,6 @@ def test_failure_between_ticks_acts_at_its_own_time(coordinates):
     assert between == pytest.approx(0.5 * (early + late), abs=0.05 * abs(late - early))
     assert [f.rotor_speed[0] > 1.0 for f in flight] == [False, False, True]
     assert [f.rotor_speed[1] for f in flight] == [0.0, 0.0, 0.0]
-
-
-@pytest.mark.nightly
-def test_pitch_of_90_degrees_ends_only_euler_angles():
-    """Only two rotors on one side run after a climb; the divisor of the Euler rates is checked before the division."""
-
-    def upside_down_volts(tick):
-        return full_voltage(tick) if tick < 100 else (0.0, 44.4, 44.4, 0.0)
-
-    with pytest.raises(LockStepError) as error:
-        lift_off([FLOWN, "multibody.coordinates=euler", *CALM], 155, upside_down_volts)
-    assert re.search(
-        r"the multirotor: \w+: pitch reached 90 degrees by t = 0\.56\d* s, where Euler angles are singular; "
-        'use multibody.coordinates = "se3"',
-        str(error.value),
-    )
-    truth, _ = lift_off([FLOWN, *CALM], 155, upside_down_volts)
-    q = truth.pose.orientation
-    assert 2.0 * (q.y * q.y + q.x * q.x) > 1.0  # past the vertical: the z axis points down
 
 
 def test_divergence_of_euler_angles_names_cause():

@@ -1,8 +1,6 @@
 """IMU errors due to cross-coupling, internal filter, sampling and rotors, against closed forms."""
 
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -18,6 +16,7 @@ from lapwing.services.sensors.low_pass import LowPass
 from lapwing.services.sensors.rotor_vibration import Damage, RotorVibration
 from lapwing.services.sensors.sensor_inputs import Truth
 from lapwing.services.sensors.triad import CrossCoupling
+from tests.commands import assert_rejected, run_command
 
 pytestmark = pytest.mark.usefixtures("uncompiled")
 
@@ -167,13 +166,7 @@ def test_command_flies_scene_with_sensor_errors(tmp_path):
         "sensors.sonar.echo={ground_loss_db=10.0,propeller_noise_db=12.0,fading_db=3.0}",
     )  # fmt: skip
     values = [part for text in tables for part in ("--set", text)]
-    command = [sys.executable, "-m", "lapwing", "run", "quad_x", "--mode", "single-process", *values]
-    done = subprocess.run([*command, "--log", str(tmp_path / "a.mcap")], capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
-    bad = subprocess.run(
-        [*command[:-2], "--set", "sensors.imu.gyro_filter={bandwidth_hz=98.0,group_delay=1e-3}"],
-        capture_output=True,
-        text=True,
-    )
-    assert bad.returncode == 2
-    assert "sensors.imu.gyro_filter.group_delay" in bad.stderr
+    command = ["run", "quad_x", "--mode", "single-process", *values]
+    run_command(*command, "--log", tmp_path / "a.mcap", code=0)
+    bad = run_command(*command[:-2], "--set", "sensors.imu.gyro_filter={bandwidth_hz=98.0,group_delay=1e-3}")
+    assert_rejected(bad, "sensors.imu.gyro_filter.group_delay")

@@ -1,14 +1,18 @@
-"""Presets of real sensors: spectrum of the readings, and values of the data sheets."""
+"""Presets of sensors, and their messages."""
 
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
 from record import REST, record
 from scipy.signal import welch
 
+from lapwing.cosim.diagram.topic_encoder import encode
+from lapwing.kernels.row_packing import pack_row
+from lapwing.messages import stamp_ns
+from lapwing.messages import topics as topic
+from lapwing.services.process_table import create_all
+from lapwing.services.scene_resolver import load, resolve
 from lapwing.services.sensors import schema
 from lapwing.services.sensors.airspeed import PRESETS as AIRSPEEDS
 from lapwing.services.sensors.barometer import PRESETS as BAROMETERS
@@ -17,6 +21,7 @@ from lapwing.services.sensors.magnetometer import PRESETS as MAGNETOMETERS
 from lapwing.services.sensors.optical_flow import PRESETS as FLOWS
 from lapwing.services.sensors.rangefinder import PRESETS as RANGEFINDERS
 from lapwing.services.sensors.sonar import PRESETS as SONARS
+from tests.commands import run_command
 
 DPS, MG, PSI = math.radians(1.0), 1e-3 * 9.80665, 6894.757
 UP = REST._replace(position_world=(0.0, 0.0, 2.0))
@@ -148,6 +153,16 @@ def test_run_command_flies_with_second_presets(tmp_path):
     }  # fmt: skip
     values = [f"sensors.{name}.preset={part}" for name, part in parts.items()]
     sets = [part for text in (*values, "run.duration=1.0", "success.require=[]") for part in ("--set", text)]
-    command = [sys.executable, "-m", "lapwing", "run", "quad_x", *sets, "--mode", "single-process"]
-    done = subprocess.run([*command, "--log", str(tmp_path / "a.mcap")], capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
+    run_command("run", "quad_x", *sets, "--mode", "single-process", "--log", tmp_path / "a.mcap", code=0)
+
+
+@pytest.mark.parametrize("which", [topic.GPS, topic.GPS_VELOCITY], ids=["fix", "velocity"])
+def test_fix_is_stamped_with_its_moment_and_never_before_start(which):
+    config = resolve(load("delivery_mission"))
+    encoder = next(w for service in create_all(config) for w in service.encoders if w.topic is which)
+    port = config.port(encoder.port)
+    ticks = encoder.period * np.arange(4)
+    rows = np.array([pack_row(port.example._replace(age=0.2))] * len(ticks))
+    payloads = [payload.tobytes() for page in encode(encoder, port, config, ticks, rows) for payload in page.payloads]
+    stamps = [stamp_ns(which.message.decode(payload).header) for payload in payloads]
+    assert stamps == [0, 0, 0, 100_000_000]

@@ -1,8 +1,6 @@
 """Constellations, shadows, multipath and RTK of a receiver against closed forms and independent implementations."""
 
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -22,6 +20,7 @@ from lapwing.services.sensors.multipath import CHIP, WAVELENGTH, Reflections
 from lapwing.services.sensors.rtk import Gap, Rtk
 from lapwing.services.sensors.satellites import Constellation
 from lapwing.services.sensors.sensor_inputs import Truth
+from tests.commands import run_command
 
 pytestmark = pytest.mark.usefixtures("uncompiled")
 
@@ -291,13 +290,11 @@ def test_command_records_details(tmp_path):
     ]  # fmt: skip
     log = tmp_path / "a.mcap"
     sets = [part for text in values for part in ("--set", text)]
-    command = [sys.executable, "-m", "lapwing", "run", "quad_x", *sets, "--mode", "single-process", "--log", str(log)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
+    command = ["run", "quad_x", *sets, "--mode", "single-process", "--log", log]
+    run_command(*command, code=0)
     details = FlightData.read(log).topic("gps/details")
     status = details["status.status"]
     assert (status[0], status[6], status[-1]) == (-1, 20, 0)
     assert details["hdop"].min() > 0.3
-    bad = subprocess.run([*command, "--set", "sensors.gps.constellation={planes=7}"], capture_output=True, text=True)
-    assert bad.returncode == 2
+    bad = run_command(*command, "--set", "sensors.gps.constellation={planes=7}", code=2)
     assert "sensors.gps.constellation.planes: expected a divisor" in bad.stderr

@@ -1,8 +1,6 @@
 """Scans of lidar and depth camera against an independent ray march, closed forms, and messages of a real run."""
 
 import math
-import subprocess
-import sys
 
 import numpy as np
 import pytest
@@ -11,6 +9,7 @@ from lapwing.dynamics.terrain import LEVEL, ray, relief
 from lapwing.dynamics.terrain.ray_casting import as_relief, cast, steepness
 from lapwing.flights.flight_data import FlightData
 from lapwing.services.sensors import depth_camera, lidar, scan
+from tests.commands import run_command
 
 pytestmark = pytest.mark.usefixtures("uncompiled")
 
@@ -114,9 +113,7 @@ def test_command_records_scans(tmp_path):
     ]  # fmt: skip
     log = tmp_path / "scan.mcap"
     sets = [part for text in values for part in ("--set", text)]
-    command = [sys.executable, "-m", "lapwing", "run", "hover", *sets, "--mode", "single-process", "--log", str(log)]
-    done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode == 0, done.stdout + done.stderr
+    run_command("run", "hover", *sets, "--mode", "single-process", "--log", log, code=0)
     flight = FlightData.read(log)
     ranges = flight.topic("scan").ranges
     assert ranges.shape[1] == 36

@@ -2,8 +2,6 @@
 
 import json
 import math
-import subprocess
-import sys
 from types import SimpleNamespace
 
 import numpy as np
@@ -17,23 +15,13 @@ from lapwing.messages.topics import LASER_SCAN
 from lapwing.services.common.schemas.vehicle_schema import airframe
 from lapwing.services.mavlink.telemetry.external_sensors import obstacle_distance
 from lapwing.services.scene_resolver import load, parse, reseed, resolve
+from tests.commands import run_command
+from tests.scenes import head, phase
 
-SCENE = """
-[run]
-duration = 1.0
-seed = 3
-[effects.gravity]
-[effects.rotor_thrust]
-[effects.ground_contact]
-[effects.body_drag]
-[effects.wind_constant]
-velocity = [5.0, 3.0, 0.0]
-[autopilot]
-gains = "tuned"
-estimator = "ground_truth"
-[[trajectory.phase]]
-name = "climb"
-z = { kind = "minimum_jerk", to = 1.0, duration = 1.0 }
+WIND = {"wind_constant": "velocity = [5.0, 3.0, 0.0]"}
+SCENE = (
+    (head(1.0, "body_drag", run="seed = 3", **WIND) + phase("climb", 1.0, "trajectory", z=1.0))
+    + """
 [[vehicle]]
 name = "seeing"
 airframe = "delivery_drone"
@@ -64,6 +52,7 @@ name = "ahead"
 airframe = "delivery_drone"
 initial_position = [4.0, 3.0]
 """
+)
 
 
 @pytest.fixture(scope="module")
@@ -76,10 +65,7 @@ def scene_file(tmp_path_factory):
 def run(file, mode):
     """Run the scene as a process. Return the path of the log, and the digest."""
     log, out = file.with_name(f"{mode}.mcap"), file.with_name(f"{mode}.json")
-    command = [sys.executable, "-m", "lapwing", "run", file, "--mode", mode, "--log", log, "--json", out]
-    arguments = [*map(str, command), "--set", "success.require=[]"]
-    done = subprocess.run(arguments, capture_output=True, text=True, timeout=600, check=False)
-    assert done.returncode == 0, done.stdout + done.stderr
+    run_command("run", file, "--mode", mode, "--log", log, "--json", out, "--set", "success.require=[]", code=0)
     return log, json.loads(out.read_text())["digest"]
 
 
@@ -163,6 +149,5 @@ def test_distance_is_that_between_vehicles(flown, scene_file):
 def test_digest_is_equal_in_processes_and_resimulation(flown, scene_file):
     log, digest = flown
     assert run(scene_file, "multi-process")[1] == digest
-    command = [sys.executable, "-m", "lapwing", "resimulate", str(log)]
-    done = subprocess.run(command, capture_output=True, text=True, timeout=600, check=False)
+    done = run_command("resimulate", log)
     assert f"digest {digest}" in done.stdout, done.stdout + done.stderr

@@ -11,45 +11,18 @@ from lapwing.flights.mission import mission_of
 from lapwing.services.scene_resolver import parse, resolve
 from lapwing.services.trajectory.leader_follower import step
 from tests.cosim.memory_log import fly
+from tests.scenes import head, phase, vehicle
 
-SCENE = """
-[run]
-duration = 2.0
-[effects.gravity]
-[effects.rotor_thrust]
-[effects.ground_contact]
-[autopilot]
-gains = "tuned"
-estimator = "ground_truth"
-[[vehicle]]
-name = "leader"
-airframe = "delivery_drone"
-initial_position = [1.0, 0.5]
-[[vehicle.trajectory.phase]]
-name = "climb"
-z = { kind = "minimum_jerk", to = 3.0, duration = 2.0 }
-[[vehicle.trajectory.phase]]
-name = "turn"
-x = { kind = "minimum_jerk", to = 5.0, duration = 4.0 }
-yaw = { kind = "minimum_jerk", to = 1.5, duration = 4.0 }
-[[vehicle.trajectory.phase]]
-name = "down"
-z = { kind = "minimum_jerk", to = 0.0, duration = 2.0 }
-[[vehicle]]
-name = "wing"
-airframe = "quad_x"
-initial_position = [-2.0, 1.5]
-autopilot = { gains = "quad_x" }
-[vehicle.trajectory]
-leader = "leader"
-[[vehicle.trajectory.phase]]
-name = "beside"
-duration = 3.0
-[[vehicle.trajectory.phase]]
-name = "closer"
-x = { kind = "minimum_jerk", to = 1.0, duration = 2.0 }
-yaw = { kind = "minimum_jerk", to = 0.3, duration = 2.0 }
-"""
+LEADER = vehicle(
+    "leader",
+    phase("climb", 2.0, z=3.0),
+    phase("turn", 4.0, x=5.0, yaw=1.5),
+    phase("down", 2.0, z=0.0),
+    start=(1.0, 0.5),
+)
+FOLLOWS = 'autopilot = { gains = "quad_x" }\n[vehicle.trajectory]\nleader = "leader"'
+CLOSER = phase("beside", 3.0) + phase("closer", 2.0, x=1.0, yaw=0.3)
+SCENE = head(2.0) + LEADER + vehicle("wing", FOLLOWS, CLOSER, start=(-2.0, 1.5), airframe="quad_x")
 
 
 def path(tmp_path, vehicle="wing", *overrides):

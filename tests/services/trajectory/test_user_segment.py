@@ -1,7 +1,5 @@
 """Trajectory segments of user modules: stored in the run configuration, checked, and equal to a shipped kind."""
 
-import subprocess
-import sys
 import tomllib
 
 import numpy as np
@@ -10,6 +8,7 @@ import pytest
 from lapwing.cosim.scene import SceneError
 from lapwing.file_schemas.json_schema import scene_schema
 from lapwing.services.scene_resolver import from_resolved, load, resolve
+from tests.commands import assert_rejected, run_command
 from tests.cosim.memory_log import fly
 
 MODULE = '''
@@ -28,7 +27,7 @@ class Line(Segment):
         return [Piece(duration, (start, (self.to - start) / duration))]
 '''
 
-ACCURACY = [sys.executable, "-m", "lapwing", "check", "log.mcap", "--accuracy", "--set", "solver.accuracy=1e-2"]
+ACCURACY = ["check", "log.mcap", "--accuracy", "--set", "solver.accuracy=1e-2"]
 
 
 def scene(folder, module=MODULE, name="line", **keys):
@@ -71,20 +70,16 @@ def test_command_resimulates_user_segment_from_log_alone(tmp_path):
     scene(tmp_path)
     keys = '{ kind = "line", module = "line", to = 1.0, rate = 0.5 }'
     phases = f'trajectory.phase=[{{ name = "up", z = {keys} }}]'
-    run = [sys.executable, "-m", "lapwing", "run", "hover.toml", "--mode", "single-process", "--log", "log.mcap"]
+    run = ["run", "hover.toml", "--mode", "single-process", "--log", "log.mcap"]
     for command in (
         [*run, "--set", phases, "--set", "run.duration=0.5"],
-        [sys.executable, "-m", "lapwing", "resimulate", "log.mcap", "--allow-code"],
+        ["resimulate", "log.mcap", "--allow-code"],
         [*ACCURACY, "--allow-code"],
     ):
-        done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, timeout=600, check=False)
-        assert done.returncode == 0, done.stderr
+        run_command(*command, code=0, folder=tmp_path)
         (tmp_path / "line.py").unlink(missing_ok=True)
-    done = subprocess.run(ACCURACY, cwd=tmp_path, capture_output=True, text=True, timeout=600, check=False)
-    assert done.returncode == 2
-    assert done.stderr.endswith(
-        "contains code of its author (modules.line.py); read it, then use --allow-code to run it\n"
-    )
+    message = "contains code of its author (modules.line.py); read it, then use --allow-code to run it\n"
+    assert_rejected(run_command(*ACCURACY, folder=tmp_path), message)
 
 
 def test_schema_accepts_user_segment(tmp_path):

@@ -4,8 +4,6 @@ import errno
 import json
 import os
 import shlex
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -24,6 +22,7 @@ from lapwing.studies.campaign.results import Results
 from lapwing.studies.campaign.runs import first_config, fly_runs, reference, row_of
 from lapwing.studies.campaign.shard_loop import Count, StoppingRule, campaign
 from lapwing.studies.campaign.statistics import interval
+from tests.commands import run_command
 
 pytestmark = pytest.mark.long
 
@@ -140,15 +139,8 @@ def test_shard_option_flies_part_of_runs(complete, tmp_path):
     code, output = run_lapwing(*arguments, "--shard", "2/2")
     assert (code, "2 of 2 flights" in output, "3 shards missing" in output) == (0, True, True)
     run_arguments = [
-        "run",
-        "hover",
-        "--set",
-        "run.duration=0.5",
-        "--campaign",
-        tmp_path / "c",
-        "--mode",
-        "single-process",
-    ]
+        "run", "hover", "--set", "run.duration=0.5", "--campaign", tmp_path / "c", "--mode", "single-process",
+    ]  # fmt: skip
     reported = {run: run_lapwing(*run_arguments, "--run", run, "--log", tmp_path / "again.mcap")[1] for run in (0, 1)}
     assert f"run 0 of {tmp_path / 'c'}: not recorded in the campaign yet" in reported[0]
     assert f"run 1 of {tmp_path / 'c'}: final state bit-for-bit identical" in reported[1]
@@ -362,9 +354,7 @@ def test_invalid_input_is_one_line(arguments, message, tmp_path):
 
 
 def run_campaign(*arguments, cwd):
-    environment = os.environ | {"PYTHONPATH": str(Path.cwd()), "COLUMNS": "80"}
-    command = [sys.executable, "-m", "lapwing", "campaign", *arguments, "--workers", "1", "--out", "c"]
-    return subprocess.run(command, cwd=cwd, env=environment, capture_output=True, text=True, timeout=280, check=False)
+    return run_command("campaign", *arguments, "--workers", "1", "--out", "c", folder=cwd, COLUMNS="80")
 
 
 def test_resumed_command_counts_all_runs(tmp_path):

@@ -6,10 +6,9 @@ import numpy as np
 import pytest
 from scipy import stats
 
-from lapwing.cosim.scene import SceneError
 from lapwing.studies.campaign.distributions import KINDS, choice, linspace, loguniform, normal, parse, uniform
 from lapwing.studies.campaign.plan import plan
-from lapwing.studies.campaign.runs import _rejection_text, first_config
+from lapwing.studies.campaign.runs import first_config
 
 
 def draw_values(new_plan, key):
@@ -143,13 +142,6 @@ def test_grid_is_accepted_when_first_runs_are_rejected():
     new_plan = plan("delivery_mission", vary=vary, design="grid")
     assert new_plan.runs == 40
     assert first_config(new_plan)[0] >= 20
-
-
-def test_rejection_text_is_independent_of_folder():
-    reported = [
-        _rejection_text(SceneError("autopilot.gains", f"no file {folder}/nix.toml")) for folder in ("/a/b", "/c")
-    ]
-    assert reported == ["autopilot.gains: no file nix.toml"] * 2
 
 
 @pytest.mark.parametrize(

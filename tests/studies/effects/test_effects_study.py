@@ -3,8 +3,6 @@
 import contextlib
 import json
 import math
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -24,6 +22,8 @@ from lapwing.studies.effects.variants import Change, changes, check_effects, fly
 from lapwing.views.studies import effects_result
 from lapwing.views.studies.study_result import show, write_json, write_plot
 from lapwing.views.terminal import console
+from tests.commands import run_command
+from tests.scenes import head, phase, vehicle
 
 SCENES = Path(__file__).parents[3] / "lapwing/scenes"
 HOVER = SCENES / "hover.toml"
@@ -187,42 +187,17 @@ def test_options_of_effects_are_studied(table, active):
     assert set(result.smallest) <= set(scene[Effects].tables)
 
 
-STACKED = """  # without downwash, the effects of the scene `fleet`
-[run]
-duration = 2.5
-[effects.gravity]
-[effects.rotor_thrust]
-[effects.ground_contact]
-[effects.body_drag]
-[effects.wind_constant]
-velocity = [0.0, 0.0, 0.0]
-[effects.downwash]
-[autopilot]
-gains = "tuned"
-estimator = "ground_truth"
-[[vehicle]]
-name = "upper"
-airframe = "delivery_drone"
-[[vehicle.trajectory.phase]]
-name = "climb"
-z = { kind = "minimum_jerk", to = 3.0, duration = 2.0 }
-[[vehicle]]
-name = "lower"
-airframe = "delivery_drone"
-initial_position = [0.0, 0.0]
-[[vehicle.trajectory.phase]]
-name = "climb"
-z = { kind = "minimum_jerk", to = 1.0, duration = 2.0 }
-"""
+CALM = {"wind_constant": "velocity = [0.0, 0.0, 0.0]"}
+STACKED = head(2.5, "body_drag", "downwash", **CALM) + "".join(  # without downwash, the effects of the scene `fleet`
+    vehicle(name, phase("climb", 2.0, z=height)) for name, height in (("upper", 3.0), ("lower", 1.0))
+)
 
 
 @pytest.mark.long
 def test_command_shows_that_stacked_vehicles_need_downwash(tmp_path):
     scene, path = tmp_path / "stacked.toml", tmp_path / "effects.json"
     scene.write_text(STACKED)
-    command = [sys.executable, "-m", "lapwing", "effects", str(scene), "--only", "downwash,collision"]
-    done = subprocess.run([*command, "--json", str(path)], capture_output=True, text=True, timeout=900, check=False)
-    assert done.returncode == 0, done.stderr
+    done = run_command("effects", scene, "--only", "downwash,collision", "--json", path, code=0)
     result = json.loads(path.read_text())
     rows = {row["name"]: row for row in result["rows"]}
     assert rows["downwash"]["influence"]["trajectory"] > 0.01

@@ -1,6 +1,4 @@
 import json
-import subprocess
-import sys
 import tomllib
 from dataclasses import replace
 
@@ -21,6 +19,7 @@ from lapwing.studies.identification.procedure import (
 )
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.start_states import NO_TRIM
+from tests.commands import assert_rejected, run_command
 
 SCENE = "crazyflie_21"
 KEYS = (
@@ -103,10 +102,6 @@ def test_toml_of_nested_tables_reads_back():
     assert tomllib.loads(dump(tables)) == tables
 
 
-def run(*arguments):
-    return subprocess.run([sys.executable, "-m", "lapwing", *map(str, arguments)], capture_output=True, text=True)
-
-
 @pytest.mark.long
 def test_command_writes_airframe_with_provenance(plant, tmp_path):
     recordings = simulated(plant, 4.0, [1, 2, 3])
@@ -115,13 +110,11 @@ def test_command_writes_airframe_with_provenance(plant, tmp_path):
     grounded = replace(recordings[0], position=recordings[0].position * [1.0, 1.0, 0.0])
     paths.append(write_csv(tmp_path / "grounded.csv", grounded))
     out, figures = tmp_path / "mine.toml", tmp_path / "mine.json"
-    done = run(
+    done = run_command(
         "identify", SCENE, *paths, "--mapping", "nanobench", "--free",
         "airframe.motor.time_constant,effects.h_force.coefficient", "--out", out, "--json", figures,
         "--windows", "60", "--trim-force", "0", "--trim-torque", "0", "--seed", "3", "--horizons", "10,50",
-        "--set", "airframe.motor.time_constant=0.08",
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+        "--set", "airframe.motor.time_constant=0.08", code=0)  # fmt: skip
     assert not done.stderr
     assert "rate [rad/s]" in done.stdout
     assert "nan" not in done.stdout  # power, which is not measured
@@ -138,8 +131,7 @@ def test_command_writes_airframe_with_provenance(plant, tmp_path):
     assert content["posterior"]["keys"] == list(content["parameters"])
     assert content["posterior"] == tomllib.loads(out.read_text())["posterior"]
     short = ("--set", "run.duration=0.5", "--set", "success.require=[]", "--runs", "3", "--csv")
-    done = run("campaign", SCENE, "--vary", out, *short, "--out", tmp_path / "flown")
-    assert done.returncode == 0, done.stderr
+    done = run_command("campaign", SCENE, "--vary", out, *short, "--out", tmp_path / "flown", code=0)
     table = np.genfromtxt(tmp_path / "flown" / "runs.csv", delimiter=",", names=True, deletechars="", dtype=None)
     batch = BatchSimulator(SCENE, 3, posterior(out))
     batch.step(np.full((3, 4), 3.0), ticks=10)
@@ -150,9 +142,12 @@ def test_command_writes_airframe_with_provenance(plant, tmp_path):
         assert len(set(table[key])) == 3
         deviation = max(variances) ** 0.5 if key.endswith("time_constant") else np.inf
         assert np.abs(table[key] - mean).max() < 4.0 * deviation
-    twice = run("campaign", SCENE, "--vary", f"{key}=normal(1,1)", "--vary", out, *short, "--out", tmp_path / "other")
-    assert (twice.returncode, len(twice.stderr.splitlines())) == (2, 1)
-    assert f"{key} already has a distribution" in twice.stderr
+    assert_rejected(
+        run_command(
+            "campaign", SCENE, "--vary", f"{key}=normal(1,1)", "--vary", out, *short, "--out", tmp_path / "other"
+        ),
+        f"{key} already has a distribution",
+    )
 
 
 @pytest.mark.long
@@ -170,7 +165,8 @@ def test_command_writes_airframe_with_provenance(plant, tmp_path):
 )
 def test_command_rejects_unknown_parameters(plant, tmp_path, free, message):
     path = write_csv(tmp_path / "flight.csv", simulated(plant, 2.0, [1])[0])
-    done = run("identify", SCENE, path, "--mapping", "nanobench", "--free", free, "--out", tmp_path / "out.toml")
-    assert done.returncode == 2
+    done = run_command(
+        "identify", SCENE, path, "--mapping", "nanobench", "--free", free, "--out", tmp_path / "out.toml", code=2
+    )
     assert message in done.stderr
     assert not (tmp_path / "out.toml").exists()

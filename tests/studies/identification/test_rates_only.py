@@ -1,8 +1,6 @@
 """Identification from logs without positions: gyroscope, accelerometer and motor commands of a known vehicle."""
 
 import json
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -16,6 +14,7 @@ from lapwing.services.scene_resolver import load_one
 from lapwing.studies.identification.procedure import start_value
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.start_states import unknown_parameters, unmeasured_motion, with_made_up_motion
+from tests.commands import run_command
 
 SCENE, DELAY = "crazyflie_21", 0.02  # [s]
 KEYS = (
@@ -68,11 +67,6 @@ def write_rates(folder: Path, flight, kind: str, attitude: bool = False):
     return path
 
 
-def run(*arguments):
-    command = [sys.executable, "-m", "lapwing", *map(str, arguments)]
-    return subprocess.run(command, capture_output=True, text=True)
-
-
 @pytest.mark.parametrize("kind", [".csv", ".ulg", ".bin"])
 def test_log_without_positions_is_read(flights, tmp_path, kind):
     result = open_flight(write_rates(tmp_path, flights[0], kind), "betaflight")
@@ -115,16 +109,16 @@ def test_accelerometer_gives_thrust_over_mass(flights):
 @pytest.mark.long
 def test_command_judges_rates_and_attitude_without_positions(flights, tmp_path):
     path = write_rates(tmp_path, flights[0], ".bin")
-    done = run("validate", SCENE, path, "--json", tmp_path / "v.json", "--report", tmp_path / "v.html")
-    assert done.returncode == 0, done.stderr
+    done = run_command("validate", SCENE, path, "--json", tmp_path / "v.json", "--report", tmp_path / "v.html", code=0)
     assert "not in the logs, thus made up and not compared: position, velocity, attitude" in done.stdout
     content = json.loads((tmp_path / "v.json").read_text())
     assert {row["signal"] for row in content["verdict"]["comparisons"]} == {"rate", "specific_force", "power"}
     assert content["flights"]["seed1"]["thrust_ratio"] == pytest.approx(1.0, abs=0.05)
     assert content["warnings"] == []
     logs = simulated(PlantRows(SCENE, INTERVAL), 12.0, [4])
-    done = run("validate", SCENE, write_rates(tmp_path, logs[0], ".ulg", attitude=True), "--json", tmp_path / "v.json")
-    assert done.returncode == 0, done.stderr
+    done = run_command(
+        "validate", SCENE, write_rates(tmp_path, logs[0], ".ulg", attitude=True), "--json", tmp_path / "v.json", code=0
+    )
     content = json.loads((tmp_path / "v.json").read_text())
     assert content["missing"] == ["position", "velocity"]
     uses = content["verdict"]["uses"]
@@ -142,12 +136,10 @@ def test_command_estimates_thrust_lag_inertia_and_delay_without_positions(flight
     wrong = (
         f"{KEYS[0]}={WRONG[0] * true[0]}", f"{KEYS[1]}={WRONG[1] * true[1]}", f"airframe.mass.inertia={inertia}",
     )  # fmt: skip
-    done = run(
+    done = run_command(
         "identify", SCENE, *paths, "--mapping", "betaflight", "--out", tmp_path / "mine.toml", "--windows", "150",
         "--json", tmp_path / "mine.json", "--free", ",".join((*KEYS, "flight.command_delay")),
-        *(part for text in wrong for part in ("--set", text)),
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+        *(part for text in wrong for part in ("--set", text)), code=0)  # fmt: skip
     assert "not known without positions: mass: only thrust over mass" in done.stdout
     content = json.loads((tmp_path / "mine.json").read_text())
     estimates = {key: entry["estimate"] for key, entry in content["parameters"].items()}

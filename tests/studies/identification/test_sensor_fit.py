@@ -1,7 +1,5 @@
 """Estimation of known sensor parameters from simulated flights."""
 
-import subprocess
-import sys
 import tomllib
 from dataclasses import replace
 
@@ -14,6 +12,7 @@ from lapwing.dynamics.geodesy import Home, enu_to_geodetic
 from lapwing.flights.log_import.recording import Recording, Series
 from lapwing.studies.identification.sensor_fit import fit_all, fit_sensors
 from lapwing.studies.validation.plant_rows import PlantRows
+from tests.commands import run_command
 
 INTERVAL, SECONDS = 0.01, 300.0
 
@@ -82,10 +81,7 @@ def test_command_fits_imu_of_columns_as_of_imported_log(tmp_path):
         ("identify", "crazyflie_21", "flight.mcap", "--sensors", "--out", "log.toml"),
     )
     for command in commands:
-        result = subprocess.run(
-            [sys.executable, "-m", "lapwing", *map(str, command)], capture_output=True, text=True, cwd=tmp_path
-        )
-        assert result.returncode == 0, result.stderr
+        run_command(*command, code=0, folder=tmp_path)
     imus = [tomllib.loads((tmp_path / name).read_text())["sensors"]["imu"] for name in ("columns.toml", "log.toml")]
     assert imus[0]["gyro"] == pytest.approx(imus[1]["gyro"], rel=0.01)
     assert imus[0]["accelerometer"] == pytest.approx(imus[1]["accelerometer"], rel=0.01)
@@ -107,23 +103,13 @@ def test_white_noise_has_no_bias_instability(flight):
 @pytest.mark.long
 def test_command_writes_tables_that_scene_takes(tmp_path):
     def run(*arguments):
-        return subprocess.run(
-            [sys.executable, "-m", "lapwing", *map(str, arguments)], capture_output=True, text=True, cwd=tmp_path
-        )
+        return run_command(*arguments, folder=tmp_path)
 
     scene = "delivery_mission"
     flights = run(
-        "run",
-        scene,
-        "--mode",
-        "single-process",
-        "--log",
-        "f.mcap",
-        "--set",
-        "run.duration=12",
-        "--set",
+        "run", scene, "--mode", "single-process", "--log", "f.mcap", "--set", "run.duration=12", "--set",
         "success.require=[]",
-    )
+    )  # fmt: skip
     assert flights.returncode == 0, flights.stderr
     done = run("identify", scene, "f.mcap", "--sensors", "--out", "sensors.toml")
     assert done.returncode == 0, done.stderr

@@ -1,6 +1,4 @@
 import json
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -11,21 +9,17 @@ from page_texts import page_text
 from lapwing.flights.log_import.open_flight import open_flight
 from lapwing.studies.validation.closed_loop import fly_setpoints
 from lapwing.studies.validation.plant_rows import MOTION, PlantRows
+from tests.commands import run_command
 
 pytestmark = pytest.mark.long
 
 SCENE = "crazyflie_21"
 
 
-def lapwing(*arguments):
-    return subprocess.run([sys.executable, "-m", "lapwing", *map(str, arguments)], capture_output=True, text=True)
-
-
 @pytest.fixture(scope="module")
 def log(tmp_path_factory):
     path = tmp_path_factory.mktemp("flown") / "flown.mcap"
-    done = lapwing("run", SCENE, "--mode", "single-process", "--log", path)
-    assert done.returncode == 0, done.stderr
+    run_command("run", SCENE, "--mode", "single-process", "--log", path, code=0)
     return path
 
 
@@ -69,8 +63,9 @@ def test_recording_without_power_has_no_power_error():
 
 def test_command_overlays_closed_loop(log, tmp_path):
     out, page = tmp_path / "errors.json", tmp_path / "page.html"
-    done = lapwing("validate", SCENE, log, "--closed-loop", "--horizons", "50", "--json", out, "--report", page)
-    assert done.returncode == 0, done.stderr
+    done = run_command(
+        "validate", SCENE, log, "--closed-loop", "--horizons", "50", "--json", out, "--report", page, code=0
+    )
     assert "Closed loop: distance from the recorded flight" in done.stdout
     (flight,) = json.loads(out.read_text())["closed_loop"]
     assert flight["difference"] < 0.05
@@ -87,10 +82,8 @@ def test_command_validates_log_with_sensors(tmp_path):
     path, out = tmp_path / "flown.mcap", tmp_path / "errors.json"
     calm = ["--set", "effects.random_wind_force.mean=[0.0, 0.0, 0.0]", "--set", "effects.random_wind_force.sigma=0.0"]
     options = ["--set", "run.duration=15.0", "--set", "success.require=[]", *calm]
-    done = lapwing("run", "delivery_mission", "--mode", "single-process", "--log", path, *options)
-    assert done.returncode == 0, done.stderr
-    done = lapwing("validate", "delivery_mission", path, "--json", out, *calm)
-    assert done.returncode == 0, done.stderr
+    run_command("run", "delivery_mission", "--mode", "single-process", "--log", path, *options, code=0)
+    run_command("validate", "delivery_mission", path, "--json", out, *calm, code=0)
     for row in json.loads(out.read_text())["horizons"]:
         error, baseline = row["position"], row["baselines"]["constant_velocity"]["position"]
         assert error < 1e-3, row["steps"]

@@ -1,7 +1,5 @@
 import json
 import re
-import subprocess
-import sys
 from dataclasses import replace
 
 import numpy as np
@@ -14,6 +12,7 @@ from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.prediction_metrics import clusters, constant_velocity, magnitudes, pool, ratios
 from lapwing.studies.validation.start_states import NO_TRIM, TrimMemory, start_states
 from lapwing.studies.validation.windows import compare, predict, thrust_ratio, window_starts
+from tests.commands import assert_rejected, run_command
 
 SCENE = "crazyflie_21"
 
@@ -145,19 +144,13 @@ def test_magnitudes_are_means_over_axes(plant, flights):
     assert magnitudes(result)[:, 0, 1] == pytest.approx(np.abs(result.velocity[:, 0]).mean(axis=1))
 
 
-def run(*arguments):
-    return subprocess.run([sys.executable, "-m", "lapwing", *map(str, arguments)], capture_output=True, text=True)
-
-
 @pytest.mark.long
 def test_command_writes_errors_and_baselines(plant, tmp_path):
     paths = [write_csv(tmp_path / f"{f.name}.csv", f) for f in simulated(plant, 4.0, [1, 2, 3])]
     out, page = tmp_path / "errors.json", tmp_path / "page.html"
-    done = run(
+    done = run_command(
         "validate", SCENE, *paths, "--mapping", "nanobench", "--horizons", "1,50", "--json", out, "--report", page,
-        "--stride", "7", "--trim-force", "2", "--trim-torque", "0", "--set", "run.seed=2",
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+        "--stride", "7", "--trim-force", "2", "--trim-torque", "0", "--set", "run.seed=2", code=0)  # fmt: skip
     first, last = json.loads(out.read_text())["horizons"]
     assert (first["steps"], last["steps"]) == (1, 50)
     assert last["windows"] > 50
@@ -179,8 +172,9 @@ def test_flight_of_another_vehicle_is_reported(plant, tmp_path):
     files = ("--json", tmp_path / "errors.json", "--report", tmp_path / "page.html")
     warning = r"mine: the motor commands produce 0\.(49|50|51) times the measured specific force; check that"
     for heavier, expected in ((), 0), (("--set", f"airframe.mass.total={2.0 * plant.mass[0]}"), 1):
-        done = run("validate", SCENE, path, "--mapping", "nanobench", "--horizons", "1,50", *files, *heavier)
-        assert done.returncode == 0, done.stderr
+        done = run_command(
+            "validate", SCENE, path, "--mapping", "nanobench", "--horizons", "1,50", *files, *heavier, code=0
+        )
         assert len(re.findall(f"warning: {warning}", done.stdout)) == expected
         assert len(json.loads((tmp_path / "errors.json").read_text())["warnings"]) == expected
         assert len(re.findall(warning, page_text(tmp_path / "page.html"))) == expected
@@ -191,11 +185,10 @@ def test_repeated_flight_counts_once(plant, tmp_path):
     """An imported log of the same file changes neither errors nor intervals."""
     paths = [write_csv(tmp_path / f"{f.name}.csv", f) for f in simulated(plant, 2.0, [1, 2])]
     copy, options = tmp_path / "copy.mcap", ("--mapping", "nanobench", "--horizons", "1,50")
-    assert run("import", paths[0], "--mapping", "nanobench", "--out", copy).returncode == 0
+    run_command("import", paths[0], "--mapping", "nanobench", "--out", copy, code=0)
     results = []
     for files in (paths, [*paths, copy]):
-        done = run("validate", SCENE, *files, *options, "--json", tmp_path / "errors.json")
-        assert done.returncode == 0, done.stderr
+        done = run_command("validate", SCENE, *files, *options, "--json", tmp_path / "errors.json", code=0)
         results.append(json.loads((tmp_path / "errors.json").read_text())["horizons"])
     assert results[0] == results[1]
     assert f"left out: copy: the same flight as {paths[0].stem}" in done.stdout
@@ -212,10 +205,7 @@ def test_repeated_flight_counts_once(plant, tmp_path):
 )
 def test_command_rejects_bad_options(plant, tmp_path, arguments, message):
     path = write_csv(tmp_path / "flight.csv", simulated(plant, 1.0, [1])[0])
-    done = run("validate", SCENE, path, "--json", tmp_path / "out.json", *arguments)
-    assert done.returncode == 2
-    assert message in done.stderr
-    assert done.stderr.count("\n") == 1
+    assert_rejected(run_command("validate", SCENE, path, "--json", tmp_path / "out.json", *arguments), message)
     assert not (tmp_path / "out.json").exists()
 
 

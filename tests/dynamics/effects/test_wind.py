@@ -1,11 +1,93 @@
+"""Winds: constant, gusts, boundary layer, random force."""
+
+import math
+
 import numpy as np
 import pytest
 from scipy.signal import welch
 
 from lapwing.dynamics import effects
 from lapwing.dynamics.effects.random_wind_force import draw, random_wind_force, reported_wind
+from lapwing.dynamics.effects.wind_boundary_layer import wind_boundary_layer
+from lapwing.dynamics.effects.wind_constant import WindConstant, wind_constant
+from lapwing.dynamics.effects.wind_gust import WindGust, edges, wind_gust
+from lapwing.dynamics.environment import Environment
 from lapwing.dynamics.noise import stream_key
+from lapwing.dynamics.terrain import LEVEL, relief
+from lapwing.dynamics.vehicles import multirotor
 from lapwing.kernels import kernel
+
+
+@pytest.mark.usefixtures("uncompiled")
+def test_uniform_wind_is_added(situation):
+    s = situation(wind=(1, 0, 0), density=1.1)
+    assert wind_constant.py_func(WindConstant((2.0, -1.0, 0.5)), (), s, s.air) == (1.1, (3.0, -1.0, 0.5))
+
+
+@pytest.mark.usefixtures("uncompiled")
+def test_every_aerodynamic_effect_feels_motion_of_air(drone):
+    """Rest in wind equals flight against it in still air for drag, H-force and inflow (Galileo)."""
+    tables = {"rotor_thrust": {}, "axial_inflow": {}, "body_drag": {}, "h_force": {}}
+    wind = (4.0, -2.0, 1.0)
+    still = multirotor.parameters(drone, effects.from_scene(tables, drone))
+    windy = multirotor.parameters(drone, effects.from_scene({**tables, "wind_constant": {"velocity": wind}}, drone))
+    start = {"position_world": (0.0, 0.0, 20.0), "rotor_speed": 330.0, "omega_body": (0.5, -0.3, 0.2)}
+    against = tuple(-v for v in wind)
+    one = multirotor.observe(windy, 0, 0.004, multirotor.initial_state(windy, **start), (32.0,) * 4)
+    other = multirotor.observe(
+        still, 0, 0.004, multirotor.initial_state(still, **start, velocity_world=against), (32.0,) * 4
+    )
+    assert one.acceleration_world == pytest.approx(other.acceleration_world, abs=1e-12)
+    assert one.angular_acceleration_body == pytest.approx(other.angular_acceleration_body, abs=1e-11)
+    assert one.motor_power == pytest.approx(other.motor_power)
+    assert one.acceleration_world[0] > 0.1
+
+
+GUST = WindGust((4.0, 0.0, -2.0), 1.0, 2.0)
+
+
+@pytest.mark.parametrize(("t", "part"), [(0.5, 0), (1.0, 0), (1.5, 0.5), (2.0, 1), (2.5, 0.5), (3.0, 0), (4.0, 0)])
+def test_one_minus_cosine(situation, t, part):
+    s = situation(t=t)
+    wind = wind_gust.py_func(GUST, (), s, s.air).wind_world
+    assert wind == pytest.approx((4.0 * part, 0.0, -2.0 * part), abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("t", "h", "following"),
+    [
+        (0.0, 0.001, 1.0),
+        (1.0, 0.001, 3.0),
+        (3.0, 0.001, math.inf),
+        (1.0, 0.2, 1.125),
+        (1.2, 0.2, 1.25),
+        (3.0, 0.2, math.inf),
+    ],
+)
+def test_break_times_are_edges_and_parts_of_short_gust(t, h, following):
+    assert edges.py_func(GUST, (), t, h, math.inf) == pytest.approx(following)
+    assert edges.py_func(GUST, (), t, h, 0.5) == 0.5
+
+
+TABLE = {"speed": 8.0, "height": 10.0, "roughness": 0.1, "direction_to": math.pi / 2}
+HILL, ROOF = relief(slope=(0.1, 0.0)), relief(boxes=[(0.0, 0.0, 500.0, 500.0, 0.0, 3.0)])
+
+
+@pytest.mark.parametrize(("terrain", "ground"), [(LEVEL, 0.0), (HILL, 2.0), (ROOF, 3.0)])
+def test_wind_is_logarithmic_in_height_over_ground(drone, situation, terrain, ground):
+    (e,) = effects.from_scene({"wind_boundary_layer": TABLE}, drone, Environment(terrain=terrain))
+
+    def wind(height):
+        s = situation(position=(20.0, 5.0, ground + height))
+        return wind_boundary_layer.py_func(e, (), s, s.air).wind_world
+
+    assert wind(10.0) == pytest.approx((0.0, 8.0, 0.0), abs=1e-9)
+    assert wind(0.0) == pytest.approx((0.0, 0.0, 0.0), abs=1e-6)
+    assert wind(-1.0)[1] == 0.0
+    # friction velocity over von Karman's constant at every height: u = a ln(1 + z / z0)
+    for height in (0.5, 3.0, 60.0):
+        assert wind(height)[1] / math.log1p(height / 0.1) == pytest.approx(8.0 / math.log(101.0), rel=1e-6)
+
 
 WIND = {"mean": [3.0, 1.0, 0.0], "sigma": 0.7}
 KEY = stream_key(3, "drone1", "effects")
