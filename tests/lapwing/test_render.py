@@ -132,3 +132,23 @@ def test_interrupted_film_leaves_former_file(log, tmp_path):
     lines = [line for line in err.replace("\r", "\n").splitlines() if "pictures" not in line and line.strip()]
     assert (command.returncode, lines) == (130, ["lapwing: ended by SIGINT"])
     assert {file.name: file.read_text() for file in tmp_path.iterdir()} == {name: "former film"}
+
+
+@pytest.mark.long
+@pytest.mark.skipif(headless.PROGRAM is None, reason="needs Chromium")
+@pytest.mark.parametrize("name", ["b.gif", "b.webp"])
+def test_command_writes_animation_of_moving_vehicle(log, name):
+    from PIL import Image
+
+    done = run(log.parent, log, "--out", name, *SMALL, "--from", "1", "--to", "2", "--fps", "2")
+    assert done.returncode == 0, done.stderr
+    film = Image.open(log.parent / name)
+    pictures = []
+    for k in range(film.n_frames):
+        film.seek(k)
+        pictures.append(np.asarray(film.convert("RGB"), float))
+        assert film.info["duration"] == 500
+    assert [picture.shape for picture in pictures] == [(120, 160, 3)] * 3
+    assert pictures[0][2, 80, 2] - pictures[0][2, 80, 0] > 40.0  # blue sky
+    assert np.ptp(pictures[0][40:80, 60:100].mean(axis=2)) > 60.0  # the vehicle
+    assert np.abs(pictures[0] - pictures[-1]).mean() > 0.05  # which moves

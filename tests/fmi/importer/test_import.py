@@ -139,6 +139,13 @@ def test_fault_is_named_with_its_time_and_log_is_complete(folder: Path, fault: i
 
 
 @pytest.mark.long
+def test_hanging_fmu_is_ended_after_its_timeout(folder: Path) -> None:
+    done = fly(scene_with(folder, start=f"fault = {HANG}", timeout=1.0), folder / "hang.mcap")
+    assert done.returncode == 1
+    assert "services.motor: small.fmu: no answer for 1 s at t = 0.500 s" in done.stderr
+
+
+@pytest.mark.long
 def test_step_longer_than_stall_is_awaited_in_multi_process_mode(folder: Path, plain_log: Path) -> None:
     """A step of 4 s; a service that reports no wait counts as stalled after 2.5 s."""
     log = folder / "slow.mcap"
