@@ -25,7 +25,7 @@ BOUND, WHY = 1e-4, "a hundred times the tolerance of a substep"
 
 def velocity_after_gust(start: float) -> np.ndarray:
     """Return the velocity [m/s] of a falling drone after a gust that begins 0.1 s after `start` [s]."""
-    tables = {"gravity": {}, "rotor_thrust": {}, "body_drag": {}}
+    tables: dict[str, dict] = {"gravity": {}, "rotor_thrust": {}, "body_drag": {}}
     gust = {"wind_gust": {"peak": (25.0, 0.0, 0.0), "start": start + 0.1, "duration": 0.3}}
     p = multirotor.parameters(DRONE, effects.from_scene({**tables, **gust}, DRONE))
     state = multirotor.initial_state(p, (0.0, 0.0, 100.0))
