@@ -4,7 +4,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lapwing.dynamics.atmosphere import EARTH_RADIUS
 from lapwing.flights.saturation import intervals
 from lapwing.flights.topic_view import TopicView
 
@@ -12,7 +11,7 @@ SHORTEST = 0.5  # [s] total time below which a warning is suppressed, except for
 # Vortex ring state, in units of the induced velocity in hover: range of the descent rate, and largest speed across the
 # rotor axis (after Leishman, Principles of Helicopter Aerodynamics, section 2.13)
 SLOWEST_DESCENT, FASTEST_DESCENT, FASTEST_ACROSS = 0.5, 1.5, 1.0
-LARGEST_DROP = 0.1  # [m] of the ellipsoid below the plane through home
+FARTHEST = 1e5  # [m] from home, range of `height_above_home`
 
 
 class ValidityWarning(NamedTuple):
@@ -40,9 +39,9 @@ def validity_warnings(truth: TopicView, scene: dict[str, Any]) -> list[ValidityW
     if grid.get("heights"):
         text = "the ground is assumed level across the edge"
         warnings += _warning(truth, off_the_grid(truth, grid), "beyond the edge of the terrain grid", text)
-    drop = (truth.position[:, :2] ** 2).sum(axis=1) / (2.0 * EARTH_RADIUS)
-    text = f"heights of barometer and GPS differ by up to {drop.max(initial=0.0):.2g} m"
-    return warnings + _warning(truth, drop > LARGEST_DROP, "more than 1.1 km from home", text)
+    far = np.hypot(*truth.position[:, :2].T) > FARTHEST
+    text = "heights of barometer and GPS differ by more than 0.1 m"
+    return warnings + _warning(truth, far, "more than 100 km from home", text)
 
 
 def _unlimited_current(truth: TopicView, scene: dict[str, Any]) -> list[ValidityWarning]:

@@ -4,7 +4,7 @@ from typing import NamedTuple
 
 from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.scene import Scene
-from lapwing.dynamics import atmosphere
+from lapwing.dynamics import atmosphere, geodesy
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.vector import Vec3
@@ -34,6 +34,7 @@ IMU_RATES = (100, 200, 250, 400)  # [Hz] values of IMU_INTEG_RATE
 OPTIONAL = (ports.AIRSPEED, ports.RANGEFINDER, ports.SONAR)
 _rotate_back = python_function(quaternion.rotate_back)
 _pressure = python_function(atmosphere.pressure)
+_height_above_home = python_function(geodesy.height_above_home)
 
 
 class Px4Config(NamedTuple):
@@ -67,7 +68,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         periods,
         _rotate_back(attitude, (0.0, 0.0, gravity(scene))),
         _rotate_back(attitude, here.magnetic_field_world),
-        _pressure(here.atmosphere, here.home.height + position[2]),
+        _pressure(here.atmosphere, here.home.height + _height_above_home(here.home, position)),
         sensor_parameters(scene),
     )
     return with_mission(scene, Px4, firmware_config(scene, tuple(sensors), periods[ports.IMU], own))

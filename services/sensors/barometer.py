@@ -6,6 +6,7 @@ from typing import Annotated, NamedTuple
 from annotated_types import Ge, Gt, Le, Lt
 
 from lapwing.dynamics.atmosphere import pressure, share_of_squares
+from lapwing.dynamics.geodesy import height_above_home
 from lapwing.dynamics.lie.quaternion import rotate_back
 from lapwing.dynamics.noise import TURN_ON, Key, normal, normal3
 from lapwing.dynamics.vector import ZERO, Vec3
@@ -81,7 +82,7 @@ def position_error(e: StaticPressureError | None, truth: Truth) -> float:
 
 @always_inline
 def _true_pressure(p: Barometer, truth: Truth) -> float:
-    static = pressure(truth.atmosphere, truth.home.height + truth.position_world[2])
+    static = pressure(truth.atmosphere, truth.home.height + height_above_home(truth.home, truth.position_world))
     return static + position_error(p.static_pressure_error, truth) + p.wash_pa_per_n * truth.thrust
 
 

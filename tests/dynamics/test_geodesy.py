@@ -24,6 +24,21 @@ def test_against_pymap3d(home):
         np.testing.assert_allclose(back, pymap3d.geodetic2enu(latitude, longitude, height, *home), atol=1e-6)
 
 
+@pytest.mark.parametrize("home", HOMES)
+@pytest.mark.parametrize(("reach", "up"), [(2e3, 500.0), (1e5, 20e3)])
+def test_barometer_air_and_gps_have_one_height(home, reach, up):
+    rng = np.random.default_rng(2)
+    for position in rng.uniform((-reach, -reach, -300.0), (reach, reach, up), (300, 3)) * (0.7, 0.7, 1.0):
+        height = geodesy.height_above_home(home, tuple(position))
+        assert height == pytest.approx(float(pymap3d.enu2geodetic(*position, *home)[2]) - home.height, abs=0.1)
+
+
+def test_height_is_that_above_the_plane_near_home_and_continuous():
+    home, edge = Home(), geodesy.FLAT
+    inside, outside = (geodesy.height_above_home(home, (0.0, r, 7.0)) for r in (edge, edge * (1.0 + 1e-12)))
+    assert (inside, outside) == (7.0, pytest.approx(7.0, abs=1e-9))
+
+
 def test_directions():
     """A step north raises the latitude, east the longitude, up the height."""
     home = Home()

@@ -7,6 +7,8 @@ from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.effects._hooks import air, discrete_update
 from lapwing.dynamics.effects._types import Air
 from lapwing.dynamics.environment import Environment
+from lapwing.dynamics.geodesy import Home, height_above_home
+from lapwing.dynamics.vector import ZERO
 from lapwing.kernels import always_inline, python_function
 
 
@@ -22,7 +24,7 @@ class AirDensity(NamedTuple):
     """
 
     atmosphere: Atmosphere = Atmosphere()
-    home_altitude: float = 0.0  # [m] of the world frame's origin above the sea
+    home: Home = Home(height=0.0)
 
     @classmethod
     def from_scene(cls, table: dict, airframe: Airframe) -> "AirDensity":
@@ -32,18 +34,18 @@ class AirDensity(NamedTuple):
 
     def in_environment(self, environment: Environment) -> "AirDensity":
         """Return the atmosphere at the scene's place and time."""
-        return AirDensity(environment.atmosphere, environment.home.height)
+        return AirDensity(environment.atmosphere, environment.home)
 
     def initial_discrete_state(self) -> tuple[float, float]:
         """Return the tangent at home."""
-        return python_function(_tangent)(self, 0.0)
+        return python_function(_tangent)(self, ZERO)
 
 
 @always_inline
-def _tangent(e, height):
-    altitude = e.home_altitude + height
+def _tangent(e, position_world):
+    altitude = e.home.height + height_above_home(e.home, position_world)
     slope = density_slope(e.atmosphere, altitude)
-    return (density(e.atmosphere, altitude) - slope * height, slope)
+    return (density(e.atmosphere, altitude) - slope * position_world[2], slope)
 
 
 @discrete_update(AirDensity)
@@ -52,7 +54,7 @@ def tangent(e, memory, s, rotors, key, tick, interval):
 
     Over an interval the height changes by centimetres: the tangent is within 1e-9 of the law, at a tenth of the cost.
     """
-    return _tangent(e, s.motion.position_world[2])
+    return _tangent(e, s.motion.position_world)
 
 
 @air(AirDensity)

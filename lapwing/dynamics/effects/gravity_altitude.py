@@ -7,8 +7,9 @@ from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.effects._from_scene import Airframe, validate_table
 from lapwing.dynamics.effects._hooks import discrete_update, field, wrench
 from lapwing.dynamics.environment import Environment
-from lapwing.dynamics.vector import NOTHING
-from lapwing.kernels import always_inline
+from lapwing.dynamics.geodesy import Home, height_above_home
+from lapwing.dynamics.vector import NOTHING, ZERO
+from lapwing.kernels import always_inline, python_function
 
 KIND = "gravity"
 
@@ -25,7 +26,7 @@ class GravityAltitude(NamedTuple):
     """
 
     acceleration: float = STANDARD_GRAVITY  # [m/s^2] at sea level
-    home_altitude: float = 0.0  # [m] of the world frame's origin above the sea
+    home: Home = Home(height=0.0)
 
     @classmethod
     def from_scene(cls, table: dict, airframe: Airframe) -> "GravityAltitude":
@@ -35,12 +36,12 @@ class GravityAltitude(NamedTuple):
 
     def in_environment(self, environment: Environment) -> "GravityAltitude":
         """Return the gravity at the scene's location."""
-        return GravityAltitude(environment.gravity, environment.home.height)
+        return GravityAltitude(environment.gravity, environment.home)
 
     @property
     def acceleration_at_home(self) -> float:
         """[m/s^2] at the world frame's origin."""
-        return _at(self, 0.0)
+        return float(python_function(_at)(self, ZERO))
 
     def initial_discrete_state(self) -> tuple[float]:
         """Return the acceleration at home [m/s^2]."""
@@ -48,15 +49,15 @@ class GravityAltitude(NamedTuple):
 
 
 @always_inline
-def _at(e, height):
-    ratio = EARTH_RADIUS / (EARTH_RADIUS + e.home_altitude + height)
+def _at(e, position_world):
+    ratio = EARTH_RADIUS / (EARTH_RADIUS + e.home.height + height_above_home(e.home, position_world))
     return e.acceleration * ratio * ratio
 
 
 @discrete_update(GravityAltitude)
 def weigh(e, memory, s, rotors, key, tick, interval):
     """Return the acceleration [m/s^2] for the next interval; it changes by 3e-7 of its value per metre."""
-    return (_at(e, s.motion.position_world[2]),)
+    return (_at(e, s.motion.position_world),)
 
 
 @field(GravityAltitude)

@@ -3,7 +3,8 @@
 The scene is flown in memory in closed loop, each time with one of the first four changed. The autopilot receives the
 ground truth, and winds have their mean values, because noise would hide the errors. Quantities that the plant holds
 over a communication step are measured without the control loop: the plant is repeated under the recorded commands, with
-more updates while each command acts as long as before.
+more updates while each command acts as long as before. In a fleet these are mostly the states of neighbours, which
+name the source there; errors are the largest of all vehicles.
 """
 
 import math
@@ -13,14 +14,17 @@ import numpy as np
 
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.scene import Scene
+from lapwing.dynamics.effects import parameter_class
+from lapwing.dynamics.effects._vehicle_interaction import INTERACTION
 from lapwing.flights.flight_data import FlightData
 from lapwing.messages.topics import TRUTH
 from lapwing.services.common.schemas.communication_schema import Communication, Rates
 from lapwing.services.common.schemas.run_schema import Run
+from lapwing.services.plant.schema import Solver
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.accuracy.open_loop import Parts, fly_parts, inputs_of_plant
 from lapwing.studies.accuracy.plant import longest_step
-from lapwing.studies.simulate import fly, fly_with_ports
+from lapwing.studies.simulate import fly_each, fly_with_ports
 
 MAX_DURATION = 20.0  # [s] of a scene without contact
 MAX_MISSION = 200.0  # [s] of a scene with contact, from take-off to rest
@@ -58,12 +62,12 @@ def errors(scene: Scene) -> list[ErrorSource]:
     base = [*scene.overrides, *noise_overrides(scene), f"run.duration={_duration(scene)!r}"]
     rate, interval = scene[Communication].rate, scene[Communication].interval
 
-    def flight_with(factor: int, coupling: str, solver: list[str]) -> FlightData:
+    def flight_with(factor: int, coupling: str, solver: list[str]) -> list[FlightData]:
         settings = [*base, *rate_overrides(scene, rate * factor), f"communication.coupling={coupling}", *solver]
-        flight: FlightData = fly(load(scene.path, settings), (TRUTH,))
-        if flight.failure:
-            raise ValueError(f"{scene.path}: {flight.failure}")
-        return flight
+        flights = fly_each(load(scene.path, settings), (TRUTH,))
+        if failure := flights[0].failure:
+            raise ValueError(f"{scene.path}: {failure}")
+        return flights
 
     def fine_solver(factor: int, accuracy: float = REFERENCE_ACCURACY) -> list[str]:
         step = interval / max(REFERENCE_STEPS, factor)
@@ -77,9 +81,10 @@ def errors(scene: Scene) -> list[ErrorSource]:
     coupling = scene[Communication].coupling
     parts = []
     exact = flight_with(1, coupling, fine_solver(1))
-    for step in (interval / n for n in STEPS if interval / n <= longest_step(scene)):
+    longest = min(longest_step(vehicle) for vehicle in scene.each_vehicle)
+    for step in (interval / n for n in STEPS if interval / n <= longest):
         flight = flight_with(1, coupling, [f"solver.step={step!r}", f"solver.accuracy={REFERENCE_ACCURACY!r}"])
-        label = f"{scene.lookup('solver.integrator')}, step {1e3 * step:g} ms"
+        label = f"{scene.each_vehicle[0][Solver].integrator}, step {1e3 * step:g} ms"
         parts.append(_error_source(SOURCES[0], step, label, flight, exact))
     for accuracy in ACCURACIES if has_contact(scene) else ():
         flight = flight_with(1, coupling, fine_solver(1, accuracy))
@@ -97,17 +102,25 @@ def errors(scene: Scene) -> list[ErrorSource]:
         parts.append(_error_source(SOURCES[3], interval / factor, label, parallel, sequential[factor]))
     _, diagram = fly_with_ports(resolve(load(scene.path, [*base, *fine_solver(1)])), (TRUTH,))
     if inputs_of_plant(diagram):
+        source = "neighbours" if acting_on_neighbours(scene) else SOURCES[4]
         reference, _ = updated(diagram, REFERENCE_RATE)
         for factor in RATE_FACTORS:
             one, _ = updated(diagram, factor)
             label = f"updates at {rate * factor} Hz"
-            parts.append(_error_source(SOURCES[4], interval / factor, label, one.flights[0], reference.flights[0]))
+            parts.append(_error_source(source, interval / factor, label, one.flights, reference.flights))
     return parts
 
 
 def has_contact(scene: Scene) -> bool:
-    """Return True if the scene's vehicle can touch the ground."""
-    return "ground_contact" in scene.tables("effects")
+    """Return True if a vehicle of the scene can touch the ground."""
+    return any("ground_contact" in vehicle.tables("effects") for vehicle in scene.each_vehicle)
+
+
+def acting_on_neighbours(scene: Scene) -> list[str]:
+    """Return the names of the effects by which the vehicles of a fleet act on each other."""
+    tables = [vehicle.tables("effects") for vehicle in scene.vehicles]
+    names = {name for own in tables for name, t in own.items() if parameter_class(name, t.get("module")) in INTERACTION}
+    return sorted(names) if len(tables) > 1 else []
 
 
 def _duration(scene: Scene) -> float:
@@ -119,8 +132,9 @@ def _duration(scene: Scene) -> float:
 
 def noise_overrides(scene: Scene) -> list[str]:
     """Return the overrides that remove noise."""
-    result = ["autopilot.estimator=ground_truth"] if scene.has("autopilot") else []
-    if "random_wind_force" in scene.tables("effects"):
+    vehicles = scene.each_vehicle
+    result = ["autopilot.estimator=ground_truth"] if all(vehicle.has("autopilot") for vehicle in vehicles) else []
+    if all("random_wind_force" in vehicle.tables("effects") for vehicle in vehicles):
         result.append("effects.random_wind_force.sigma=0.0")
     return result
 
@@ -131,8 +145,12 @@ def rate_overrides(scene: Scene, rate: int) -> list[str]:
     return [f"communication.rate={rate}", *bodies]
 
 
-def _error_source(source: str, setting: float, label: str, flight: FlightData, exact: FlightData) -> ErrorSource:
-    return ErrorSource(source, setting, label, *difference(flight, exact))
+def _error_source(
+    source: str, setting: float, label: str, flights: list[FlightData], exact: list[FlightData]
+) -> ErrorSource:
+    """Return the largest errors of all vehicles."""
+    errors_of_each = [difference(*pair) for pair in zip(flights, exact, strict=True)]
+    return ErrorSource(source, setting, label, *map(max, zip(*errors_of_each, strict=True)))
 
 
 def difference(one: FlightData, other: FlightData) -> tuple[float, float, float]:

@@ -126,6 +126,23 @@ def measure(scene: Scene, progress: Progress, step_selected: bool = False) -> Fl
     return result._replace(quantities=solver_errors, part_length=PART_LENGTH, closed_loop=closed_loop)
 
 
+def error_of_neighbours(scene: Scene) -> float:
+    """Return the largest error by states of neighbours that are held over a communication step, in the scene's flight.
+
+    It is 0 for a flight that fails, and if the rate is too high to be measured (`MOST_UPDATES`).
+    """
+    _, overrides = _finer(scene, scene.each_vehicle[0][Solver].accuracy or 1.0)
+    finer = resolve(load(scene, overrides))
+    faster = _faster(scene.each_vehicle[0], finer, lambda more: load(scene, [*overrides, *more]))
+    flights, diagram = fly_with_ports(finer, TOPICS)
+    if faster is None or any(flight.failure for flight in flights):
+        return 0.0
+    _, held = _in_parts(
+        _Flight(finer, flights, diagram), finer, faster, lambda _, __, work: work(lambda tick: None), ""
+    )
+    return worst_of(held).error
+
+
 def measure_recorded(
     config: RunConfig, commands: Mapping[str, Any], progress: Progress, accuracy: float | None = None
 ) -> FlightAccuracy:

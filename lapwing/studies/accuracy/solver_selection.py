@@ -20,7 +20,9 @@ from lapwing.services.common.schemas.communication_schema import Communication
 from lapwing.services.common.schemas.run_schema import Run
 from lapwing.services.common.schemas.vehicle_schema import Effects, Vehicle
 from lapwing.services.plant.schema import Solver, accuracy_to_select_for
-from lapwing.studies.accuracy import plant, scenes
+from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.accuracy import flight_accuracy, plant, scenes
+from lapwing.studies.accuracy.error_budget import acting_on_neighbours
 from lapwing.studies.accuracy.problem import SolverMethod
 from lapwing.studies.accuracy.work_precision import FINE_ENOUGH, Point, cheapest, measure
 
@@ -55,7 +57,28 @@ def overrides(scene: Scene, notify: Callable[[str], None]) -> list[str]:
         message = f"{accuracy:g}: {error.message}"
         raise SceneError("solver.accuracy", message, source=KeyOrigin(scene.path)) from None
     # exact step that `Solver.check` accepts as a divisor of the communication step
-    return [f'solver.integrator="{selected.method}"', f"solver.step={selected.setting!r}"]
+    chosen = [f'solver.integrator="{selected.method}"', f"solver.step={selected.setting!r}"]
+    _warn_of_neighbours(scene, chosen, accuracy, notify)
+    return chosen
+
+
+def _warn_of_neighbours(scene: Scene, chosen: list[str], accuracy: float, notify: Callable[[str], None]) -> None:
+    """Notify if states of neighbours, held over a communication step, have an error above the accuracy."""
+    names = ", ".join(acting_on_neighbours(scene))
+    if not names:
+        return
+    first = scene.each_vehicle[0]
+    path, error = _cache_file(first, tuple(chosen), repr(resolve(load(scene, chosen)).resolved)), math.nan
+    if path and path.is_file():
+        with suppress(OSError, ValueError):
+            error = float(path.read_text(encoding="utf-8"))
+    if math.isnan(error):
+        notify(f"measuring the error of {names} between vehicles (first time only)")
+        error = flight_accuracy.error_of_neighbours(load(scene, chosen))
+        _store(path, repr(error))
+    if error > accuracy:
+        message = f"{names} between vehicles, at {first[Communication].rate} Hz, err by {error:.2g}, above {accuracy:g}"
+        notify(f"warning: solver.accuracy: {message}; no step reduces it, a higher communication.rate does")
 
 
 def _combine_vehicles(vehicles: list[list[Point]]) -> list[Point]:
@@ -123,12 +146,16 @@ def _points(scene: Scene, names: tuple[str, ...], notify: Callable[[str], None])
     measured = ", ".join(method.name for method in problems[0].methods)
     notify(f"measuring {measured} on this plant for solver.accuracy (first time only)")
     points = [measure(problem, sys.maxsize, timed=False) for problem in problems]
+    _store(path, json.dumps([[p._asdict() for p in each] for each in points]))
+    return points
+
+
+def _store(path: Path | None, text: str) -> None:
     if path is not None:
-        with suppress(OSError):  # without a cache they are measured again
+        with suppress(OSError):  # without a cache it is measured again
             path.parent.mkdir(parents=True, exist_ok=True)
             with complete_file(path) as file:
-                file.write_text(json.dumps([[p._asdict() for p in each] for each in points]), encoding="utf-8")
-    return points
+                file.write_text(text, encoding="utf-8")
 
 
 def _down_to(finest: float, method: SolverMethod) -> SolverMethod:
@@ -143,8 +170,8 @@ def _read(path: Path) -> list[list[Point]]:
     return []
 
 
-def _cache_file(scene: Scene, names: tuple[str, ...]) -> Path | None:
-    """Return the cache file, named by a digest of sources, integrators and plant; None without a cache."""
+def _cache_file(scene: Scene, names: tuple[str, ...], more: str = "") -> Path | None:
+    """Return the cache file, named by a digest of sources, integrators, plant and `more`; None without a cache."""
     folder = cache_folder()
     if folder is None:
         return None
@@ -157,6 +184,6 @@ def _cache_file(scene: Scene, names: tuple[str, ...]) -> Path | None:
     digest = hashlib.blake2b(source_digest(modules).encode(), digest_size=8)
     run, manoeuvres = scene[Run], [voltages.__name__ for voltages in plant.MANOEUVRES]
     flight = names, manoeuvres, run.seed, scene[Vehicle].name, run.duration, scene[Communication].rate
-    for part in (*flight, dict(scene[Effects].tables), scenes.physics(scene)):
+    for part in (*flight, dict(scene[Effects].tables), scenes.physics(scene), *filter(None, [more])):
         digest.update(repr(part).encode())
     return folder / "accuracy" / f"{scene.name}-{digest.hexdigest()}.json"

@@ -68,7 +68,7 @@ def study(screen: Console, target: str, overrides: list[str], goal: float | None
     """
     check_target(goal)
     scene = scene_of(target, overrides)
-    problem = scenes.problem(scene) if scene else find(target)
+    problem = scenes.problem(scene.each_vehicle[0]) if scene else find(target)
     compiled = statistics().compiled
 
     def notify() -> None:

@@ -1,6 +1,7 @@
 """Fusion of sonar near the ground and barometer (theory, eqs. (3.31), (3.32), (3.71) and (3.67))."""
 
 from lapwing.dynamics.atmosphere import pressure_altitude
+from lapwing.dynamics.geodesy import height_above_home
 from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import ZERO
 from lapwing.kernels import kernel, math
@@ -56,7 +57,7 @@ def update_barometer(p: Estimator, s: State, pressure: float, variance: float, v
     clear(m)
     m.row[POSITION + 2] = 1.0
     m.row[BAROMETER] = 1.0
-    innovation = altitude - s.nominal.position_world[2] - s.nominal.barometer_bias
+    innovation = altitude - height_above_home(p.home, s.nominal.position_world) - s.nominal.barometer_bias
     if p.static_pressure_error != NO_STATIC_PRESSURE_ERROR:
         innovation -= static_pressure_height(p, s)
     return _scalar(p, s, BARO, innovation, variance * slope * slope)

@@ -7,7 +7,7 @@ import pytest
 import synthetic_flights
 
 from lapwing.services.scene_resolver import load
-from lapwing.studies.accuracy.error_budget import SOURCES, difference, errors
+from lapwing.studies.accuracy.error_budget import SOURCES, _error_source, difference, errors
 from lapwing.studies.simulate import fly
 
 ROOT = Path(__file__).parents[3]
@@ -31,6 +31,13 @@ def test_difference_at_common_ticks():
         assert angle == pytest.approx(1e-9)
     opposite = flight(10, fine.truth.position, -fine.truth.orientation)
     assert difference(fine, opposite) == (0.0, 0.0, 0.0)
+
+
+def test_error_of_a_fleet_is_that_of_its_worst_vehicle():
+    exact = [flight(5, np.zeros((5, 3)), yaw_quaternion(0.0)) for _ in range(2)]
+    moved = [flight(5, np.full((5, 3), x), yaw_quaternion(a)) for x, a in ((0.0, 1e-9), (0.1, 0.0))]
+    row = _error_source("neighbours", 0.2, "", moved, exact)
+    assert (row.position, row.attitude) == pytest.approx((0.1 * 3.0**0.5, 1e-9))
 
 
 def test_flight_in_memory_moves_plant():

@@ -14,7 +14,7 @@ import pytest
 from lapwing.cosim.scene import SceneError
 from lapwing.services.plant.schema import Solver, method
 from lapwing.services.scene_resolver import load
-from lapwing.studies.accuracy import integrate, scenes, solver_selection
+from lapwing.studies.accuracy import flight_accuracy, integrate, scenes, solver_selection
 from lapwing.studies.accuracy.work_precision import Point
 
 ROOT = Path(__file__).parents[3]
@@ -117,12 +117,31 @@ def test_fleet_has_one_solver_that_meets_accuracy_of_each_vehicle(measured_title
         return [p._replace(error=error) for p, error in zip(points, by_problem[key], strict=True)]
 
     monkeypatch.setattr(solver_selection, "measure", measure)
+    monkeypatch.setattr(flight_accuracy, "error_of_neighbours", lambda scene: 9e-5)
     scene = load(ROOT / "lapwing/scenes/formation.toml", ["solver.accuracy=1e-4", "vehicle.1.airframe=quad_x"])
     result = solver_selection.overrides(scene, lambda text: None)
     assert len(by_problem) == 2
     assert result == ['solver.integrator="rk4"', "solver.step=0.001"]
     resolved = load(scene, result)
     assert [method(vehicle)[2] for vehicle in resolved.vehicles] == [0.001] * 3
+
+
+@pytest.mark.long
+def test_warning_has_larger_error_between_vehicles_of_a_fleet_and_its_effects(measured_titles, monkeypatch):
+    """No step reduces it. It is measured once, with the selected step; vehicles that do not interact have none."""
+    steps, lines = [], []
+    monkeypatch.setattr(
+        flight_accuracy, "error_of_neighbours", lambda scene: steps.append(scene.vehicles[0][Solver].step) or 2e-3
+    )
+    for _ in range(2):
+        assert solver_selection.overrides(load("formation", ["solver.accuracy=1e-3"]), lines.append)
+    warnings = [line for line in lines if line.startswith("warning: solver.accuracy: collision, downwash between")]
+    assert len(warnings) == 2
+    assert "at 250 Hz, err by 0.002, above 0.001; no step reduces it" in warnings[0]
+    assert steps == [0.004]
+    lines.clear()
+    assert solver_selection.overrides(load("fleet", ["solver.accuracy=1e-3"]), lines.append)
+    assert not any("warning" in line for line in lines)
 
 
 def test_fleet_with_step_of_one_vehicle_selects_none(measured_titles):
