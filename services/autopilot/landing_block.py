@@ -52,8 +52,8 @@ def settle(e: StateEstimate, setpoint: Setpoint) -> Setpoint:
     """Return the setpoint in contact: level, at the vehicle's present place, height and speed.
 
     The thrust is then that of hover, of which the motors get a falling share. The feet hold the place, and an impact
-    disturbs the estimate for a second: a correction of height or speed would lift or drop the vehicle, that of the place
-    would tip it on a slope. If it was no contact, the vehicle falls and flies on.
+    disturbs the estimate for a second: a correction of height or speed would lift or drop the vehicle, that of the
+    place would tip it on a slope. If it was no contact, the vehicle falls and flies on.
     """
     return move(setpoint, e.position_world, e.velocity_world, ZERO)
 
