@@ -50,9 +50,7 @@ class Watch(NamedTuple):
     running: np.ndarray  # `RUNNING`
     names: np.ndarray  # `NAMES`
     prefixes: np.ndarray  # (n, m) uint8, by signal, padded with zeros: start of the line; empty for others
-    words: (
-        np.ndarray
-    )  # (4, m) uint8: around the name of a block, in place of it, and before compiling services
+    words: np.ndarray  # (4, m) uint8: around the name of a block, in place of it, and before compiling services
     limit: float  # [s] for a block, or for the compilation
     idle_limit: float  # [s] while no block runs
 
