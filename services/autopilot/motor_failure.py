@@ -85,7 +85,8 @@ def build(airframe: Airframe, gyro_range: float, values: Mapping[str, float]) ->
     enabled = values.get("FD_ACT_EN", 1.0) != 0.0  # not in logs of former versions
     damping = a.rotational_drag[0] / a.inertia_body[0], a.rotational_drag[1] / a.inertia_body[1]
     return Parameters(
-        roll, pitch, a.inertia_body, damping, a.motor.time_constant, hover_thrust, prior, a.gravity, gyro_range, enabled,
+        roll, pitch, a.inertia_body, damping, a.motor.time_constant, hover_thrust, prior, a.gravity, gyro_range,
+        enabled,
     )  # fmt: skip
 
 
