@@ -82,7 +82,9 @@ def with_causes(outcome: FlightOutcome, flight: Flight) -> FlightOutcome:
     begin = min([end, *(incident.time for incident in chain)])
     first = [touch for touch in flight.contacts if _start(flight, touch) == begin]
     hit = any(touch.body != GROUND for touch in first)
-    causes = [] if hit and _off_path(flight, begin)[0] < ON_PATH else list(_failures(flight, begin))
+    causes = list(_failures(flight, begin))
+    if hit and _off_path(flight, begin)[0] < ON_PATH:  # it is on its way: only lost thrust has to do with it
+        causes = [cause for cause in causes if "rotor" in cause.text or "propeller" in cause.text]
     if outcome.how.startswith(NEVER_LEFT):
         causes += [] if causes else _lack_of_thrust(flight)
     elif not (hit or causes or in_failsafe or any(_as_commanded(flight, touch) for touch in first)):
@@ -117,14 +119,15 @@ def _with_hits(outcome: FlightOutcome, flight: Flight) -> FlightOutcome:
     """Return the outcome of a flight that was not lost, with the first hit of each obstacle and vehicle."""
     hits: dict[str, Incident] = {}
     for touch in flight.contacts:
-        slipped = touch.face and float(flight.truth.times[touch.stop - 1]) - _start(flight, touch) < SLIPPING
-        slipped = slipped and touch.stop < len(flight.truth)
+        leaves = touch.stop < len(flight.truth)
+        brief = float(flight.truth.times[touch.stop - 1]) - _start(flight, touch) < SLIPPING
+        slipped = bool(touch.lands and touch.face and brief and leaves)
         if (not touch.lands or slipped) and touch.speed > GENTLE:
             text = f"slipped off {touch.where}{touch.circumstances}" if slipped else _hit(flight, touch)
             hits.setdefault(touch.body, Incident(_start(flight, touch), text))
     if not hits:
         return outcome
-    how = ", ".join(filter(None, (outcome.how, *(f"{text} at {time:.2f} s" for time, text in hits.values()))))
+    how = ", ".join(filter(None, (outcome.how, *(f"{text}, at {time:.2f} s" for time, text in hits.values()))))
     return outcome._replace(how=how, causes=(*outcome.causes, *hits.values()))
 
 
@@ -270,7 +273,9 @@ def _weak_rotors(flight: Flight, time: float) -> Iterator[Incident]:
             starts[k + 1] = float(truth.times[lasting[0]])
     planned = flight.origin.scene.get("effects", {}).get("rotor_damage")
     if len(starts) == weak.shape[1] > 1:
-        yield Incident(min(starts.values()), "all rotors lost thrust")
+        off = flight.has("battery") and (flight.topic("battery").voltage <= 0.0).any()
+        cause = "the battery switched off: " if off else ""
+        yield Incident(min(starts.values()), f"{cause}all rotors lost thrust")
     elif planned is None:
         yield from (Incident(start, f"rotor {k} lost its thrust") for k, start in starts.items())
 

@@ -24,7 +24,8 @@ HARDER, SOFT = 1.1, 0.1  # a touch is harder than commanded above 1.1 times that
 COMMANDED_TIME = 0.5  # [s] before a touch, over which the largest descent speed of the setpoint is the commanded one
 UPSIDE = 0.0  # cosine of the tilt below which the vehicle has turned over: a crash
 SLOW = 0.5  # [m/s] largest speed of a vehicle at rest
-UPRIGHT = math.cos(math.radians(30.0))  # cosine of the largest tilt of a vehicle at rest
+LYING = math.radians(30.0)  # least tilt of a vehicle that does not rest on its feet
+UPRIGHT = math.cos(LYING)
 RESTING = 0.1  # [m] largest difference from the initial height at rest, for plants without contact information
 TRYING = 1.0  # [s] with motors after which a vehicle on the ground should have left it
 LANDING_RADIUS = 5.0  # [m] horizontal distance from the mission's target: uncorrected satellite navigation
@@ -75,7 +76,8 @@ class FlightOutcome(NamedTuple):
         if self.kind == "completed":
             return f"Completed at {self.time:.2f} s: {self.how}"
         x, y, z = self.position
-        where = "" if self.kind in ("diverged", "aborted") else f"; ends at ({x:.2f}, {y:.2f}, {z:.2f}) m"
+        tilted = f"tilted by {math.degrees(self.tilt):.0f}° " if self.kind == "crashed" and self.tilt > LYING else ""
+        where = "" if self.kind in ("diverged", "aborted") else f"; ends {tilted}at ({x:.2f}, {y:.2f}, {z:.2f}) m"
         later = [f"{text} {time - self.time:.2f} s later" for time, text in self.consequences[:MOST_CONSEQUENCES]]
         if hidden := len(self.consequences) - len(later):
             later.append(f"{hidden} more")

@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from typing import NamedTuple, Protocol, Self
 
 from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.diagram.compiled_loop import set_compiling
 from lapwing.kernels import on_compile
 
 
@@ -44,6 +45,7 @@ def notify_on_compile(config: RunConfig, show: Callable[[Compilation], None]) ->
         nonlocal active
         if active:
             active = False
+            set_compiling(", ".join(config.services))
             show(Compilation.of(config))
 
     on_compile(listener)
@@ -51,6 +53,7 @@ def notify_on_compile(config: RunConfig, show: Callable[[Compilation], None]) ->
         yield
     finally:
         active = False
+        set_compiling("")
 
 
 class Elapsed(NamedTuple):

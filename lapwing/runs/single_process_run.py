@@ -50,7 +50,7 @@ def fly_single(
         Interrupted: ended by a signal.
     """
     watcher = observer or Silent()
-    with notify_on_compile(config, watcher.compiling):
+    with Watchdog(), notify_on_compile(config, watcher.compiling):
         diagram = BlockDiagram(config, create_all(config, operator, recorded), KEPT_TICKS)
     about = metadata(config, "single-process")
     with Stop(running_block) as stop, Watchdog(), LogWriter(log, about, attachments(config, sources or {})) as writer:

@@ -8,11 +8,13 @@ from lapwing.kernels.cell import read
 from lapwing.services.autopilot import control, motor_failure
 from lapwing.services.autopilot.commander_wakeup import battery_warning
 from lapwing.services.autopilot.land_detector import FLYING, LANDED, ON_GROUND
-from lapwing.services.autopilot.mixer import scale_all, zero_thrust
-from lapwing.services.common.ports import AutopilotStatus, MotorCommand, Setpoint, StateEstimate
+from lapwing.services.autopilot.mixer import clamp_to_range, scale_all, zero_thrust
+from lapwing.services.autopilot.motor import thrust_at
+from lapwing.services.common.ports import AutopilotStatus, BatteryReading, MotorCommand, Setpoint, StateEstimate
 
 ORDER, FLIGHT = "order", "flight"  # ports within the autopilot
 NO_TRAJECTORY = "no_trajectory"  # placeholder of the trajectory's port; never written
+NO_READING = BatteryReading(math.nan, math.inf)  # unknown charge, any voltage
 
 
 class ControllerInput(NamedTuple):
@@ -51,14 +53,12 @@ class ControllerState(NamedTuple):
     control: control.State
     failure_detector: motor_failure.State
     still_from: int  # [tick]
-    charge: float  # charge of the battery, fraction; NaN: unknown
+    battery: BatteryReading
 
 
 def start(p: Controller) -> ControllerState:
     """Return the initial state."""
-    return ControllerState(
-        control.START, python_function(motor_failure.start)(read(p.failure_detector)), 0, float("nan")
-    )
+    return ControllerState(control.START, python_function(motor_failure.start)(read(p.failure_detector)), 0, NO_READING)
 
 
 class StepStart(NamedTuple):
@@ -73,7 +73,7 @@ class StepStart(NamedTuple):
     restarts: bool  # the controller is reset at this tick
     failure_detector: motor_failure.State
     still_from: int  # [tick]
-    charge: float
+    battery: BatteryReading
 
 
 @always_inline
@@ -84,11 +84,10 @@ def start_step(p: Controller, s: Any, tick: int, inputs: tuple[InputSample, ...]
     detector, still_from = s.failure_detector, s.still_from
     if restarts:
         detector, still_from = motor_failure.start(p.failure_detector.value), tick + p.bounce
-    charge = battery.value.charge if battery.due else s.charge
     state = landing.landed_state
     return StepStart(
         inputs[0].value, order, landing.setpoint, state, state == FLYING, landing.power,
-        restarts, detector, still_from, charge,
+        restarts, detector, still_from, battery.value if battery.due else s.battery,
     )  # fmt: skip
 
 
@@ -115,13 +114,14 @@ def block_outputs(
     thrust, voltage = c.thrust, c.motor_voltage
     if i.power < 1.0:
         thrust, voltage = scale_all(i.power, thrust), scale_all(math.sqrt(i.power), voltage)
-    detector = motor_failure.step(p.failure_detector.value, i.failure_detector, p.interval, i.estimate, height, thrust)
+    reached = clamp_to_range(thrust, thrust_at(p.law.value.motor, i.battery.voltage))
+    detector = motor_failure.step(p.failure_detector.value, i.failure_detector, p.interval, i.estimate, height, reached)
     flying = i.flying
     armed = flying if order.follow else order.armed
     finished = (i.landed_state == LANDED and setpoint.final) if order.follow else order.finished
     released = order.released or (order.follow and setpoint.release and not flying)
     attitude_reference = (c.roll_reference, c.pitch_reference, c.yaw_reference)
-    warning = battery_warning(p.thresholds.value, i.charge)
+    warning = battery_warning(p.thresholds.value, i.battery.charge)
     return detector, (
         MotorCommand(voltage, flying, thrust, attitude_reference),
         setpoint,
@@ -143,4 +143,4 @@ def step(
         before, failed = control.START if i.restarts else s.control, i.failure_detector.failed
         control_state, c = control.step(p.law.value, before, p.interval, i.estimate, i.setpoint, failed)
     detector, outputs = block_outputs(p, i, c)
-    return ControllerState(control_state, detector, i.still_from, i.charge), outputs, CONTINUE
+    return ControllerState(control_state, detector, i.still_from, i.battery), outputs, CONTINUE

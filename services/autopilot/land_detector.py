@@ -15,6 +15,7 @@ LIFT_TIME = 1.0  # [s] time constant in which the lift of the commanded thrust i
 LEAST_LIFT, MOST_LIFT = 0.5, 2.0  # of the commanded thrust
 CLEAR = 0.2  # [m] over the ground, from which it is learned
 HYSTERESIS = 0.5  # contact lasts down to this fraction of `ground_force`
+SETTLING = 0.6  # fraction of the commanded thrust from contact on, which presses the feet down without a fall
 FASTEST = 2.0  # [m/s] and up to this speed: the vehicle tilts onto its feet, and impacts disturb the estimate by 1
 CUT_REST_TIME = 2.0  # [s] at rest with a setpoint on the ground, after which the motors stop without `cut_height`
 CUT_HEIGHT_ERROR = 0.5  # [m] maximum error of the estimated height for that
@@ -49,17 +50,16 @@ class LandedState(NamedTuple):
     name: int  # ON_GROUND, FLYING or LANDED
     contact_time: float  # [s] of contact, or at rest with a setpoint on the ground
     support: float  # filtered vertical force that is not that of the rotors, fraction of the weight
-    power: float  # fraction of the commanded thrust that the motors get: falls from 1 to 0 after contact
-    contact: bool  # at the last tick
+    power: float  # fraction of the commanded thrust that the motors get: falls to 0 after contact
     lift: float  # measured lift over that of the model, learned in flight: mass, motors or air differ
 
 
-INITIAL_LANDED_STATE = LandedState(ON_GROUND, 0.0, 0.0, 1.0, False, 1.0)
+INITIAL_LANDED_STATE = LandedState(ON_GROUND, 0.0, 0.0, 1.0, 1.0)
 
 
 @always_inline
 def _without_contact(name: int, time: float) -> LandedState:
-    return LandedState(name, time, 0.0, 1.0, False, 1.0)
+    return LandedState(name, time, 0.0, 1.0, 1.0)
 
 
 def build(
@@ -129,13 +129,13 @@ def _detect_contact(
     contact = support > share * t.ground_force and abs(fall) < fastest and descends(p, setpoint)
     contact = contact and (recent or lift < t.thrust)
     time = s.contact_time + dt if contact else max(0.0, s.contact_time - dt)
-    power = min(1.0, 1.0 - (time - t.hold_time) / t.ramp_time)
+    power = SETTLING * min(1.0, 1.0 - (time - t.hold_time) / t.ramp_time) if time > 0.0 else 1.0
     if power <= 0.0:
         return _without_contact(LANDED, 0.0)
     learns = time <= 0.0 and estimate.position_world[2] - p.resting_height > CLEAR
     learns = learns and (setpoint.velocity_world[2] >= 0.0 or support < HYSTERESIS * t.ground_force)
     ratio = s.lift + dt / LIFT_TIME * (force - lift) if learns else s.lift
-    return LandedState(FLYING, time, support, power, contact, min(max(ratio, LEAST_LIFT), MOST_LIFT))
+    return LandedState(FLYING, time, support, power, min(max(ratio, LEAST_LIFT), MOST_LIFT))
 
 
 @always_inline

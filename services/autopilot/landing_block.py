@@ -5,11 +5,10 @@ from typing import Any, NamedTuple
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.vector import ZERO
 from lapwing.kernels import always_inline
-from lapwing.services.autopilot.approach import DEEPEST, NO_APPROACH, Approach, move, update_approach
+from lapwing.services.autopilot.approach import NO_APPROACH, Approach, move, update_approach
 from lapwing.services.autopilot.land_detector import FLYING, INITIAL_LANDED_STATE, LandedState, update_landed_state
 from lapwing.services.common.ports import PerRotor, Setpoint, StateEstimate
 
-PUSH = 0.3  # [m/s] of the setpoint below the vehicle's speed in contact
 LANDING = "landing"  # port within the autopilot
 
 
@@ -50,14 +49,13 @@ def total(thrust: PerRotor) -> float:
 
 @always_inline
 def settle(e: StateEstimate, setpoint: Setpoint) -> Setpoint:
-    """Return the setpoint in contact: below the vehicle, so that the thrust falls, level, and at its present place.
+    """Return the setpoint in contact: level, at the vehicle's present place, height and speed.
 
-    The feet hold the place. After an impact the estimated velocity is wrong for a second, and its correction would lift
-    the vehicle; that of the place would tip it on a slope. If it was no contact, the vehicle falls and flies on.
+    The thrust is then that of hover, of which the motors get a falling share. The feet hold the place, and an impact
+    disturbs the estimate for a second: a correction of height or speed would lift or drop the vehicle, that of the
+    place would tip it on a slope. If it was no contact, the vehicle falls and flies on.
     """
-    x, y, z = e.position_world
-    vx, vy, vz = e.velocity_world
-    return move(setpoint, (x, y, z - DEEPEST), (vx, vy, vz - PUSH), ZERO)
+    return move(setpoint, e.position_world, e.velocity_world, ZERO)
 
 
 @always_inline
@@ -76,7 +74,7 @@ def step(
         approach = NO_APPROACH
     thrust = total(inputs[3].value.thrust) if inputs[3].due else 0.0
     landed = update_landed_state(d, landed, e, setpoint, thrust, p.interval)
-    if d.thresholds.cut_height <= 0.0 and landed.contact:
+    if landed.power < 1.0:
         setpoint = settle(e, setpoint)
     return (
         LandingState(landed, approach),

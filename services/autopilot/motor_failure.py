@@ -18,9 +18,8 @@ from lapwing.services.common.ports import PerRotor, StateEstimate
 
 BANDWIDTH = 40.0  # [rad/s] of the filters
 LEAST_LOSS = 0.3  # fraction of lost thrust that model errors may feign
-AIR_RATE = 0.3  # [rad/s] of air that turns; its drag may feign a loss, too
 ALIGNED = 0.25  # maximum squared fraction of the disturbance that is not along the rotor's arm
-ALARM = 0.12  # [s] integral of the loss above `least_loss`
+ALARM = 0.12  # [s] integral of the loss above LEAST_LOSS
 MEAN_TIME = 1.0  # [s] of the means
 LEARNING_TIME = 3.0  # [s] of the moments and of the lift
 CAUTION = 0.1  # speed of learning while a rotor is suspected
@@ -42,7 +41,6 @@ class Parameters(NamedTuple):
     damping: tuple[float, float]  # [1/s] of the rates about body x and y
     time_constant: float  # [s] first-order lag of the rotor speeds
     hover_thrust: float  # thrust of each rotor [N]
-    least_loss: float  # fraction of lost thrust that adds no evidence
     prior: float  # [rad^2/s^4] weight of the modelled effectiveness
     gravity: float  # [m/s^2]
     gyro_range: float  # [rad/s]
@@ -71,7 +69,7 @@ class State(NamedTuple):
     load: float  # mean specific force along body z [g]
     collective: float  # mean of the expected thrusts, over the hover thrust
     loss: PerRotor  # lost fraction of each rotor's thrust
-    evidence: PerRotor  # [s] integral of each rotor's loss above `least_loss`
+    evidence: PerRotor  # [s] integral of each rotor's loss above LEAST_LOSS
     failed: int  # number of the failed rotor, from 1; 0: none
     pause: float  # [s] remaining time after an impact
 
@@ -86,11 +84,9 @@ def build(airframe: Airframe, gyro_range: float, values: Mapping[str, float]) ->
     prior = PRIOR * square * hover_thrust * hover_thrust
     enabled = values.get("FD_ACT_EN", 1.0) != 0.0  # not in logs of former versions
     damping = a.rotational_drag[0] / a.inertia_body[0], a.rotational_drag[1] / a.inertia_body[1]
-    turn = math.sqrt(square) * hover_thrust  # [rad/s^2] by the thrust of one rotor in hover
-    least_loss = LEAST_LOSS + AIR_RATE * max(damping) / turn
     return Parameters(
-        roll, pitch, a.inertia_body, damping, a.motor.time_constant, hover_thrust, least_loss, prior, a.gravity,
-        gyro_range, enabled,
+        roll, pitch, a.inertia_body, damping, a.motor.time_constant, hover_thrust, prior, a.gravity, gyro_range,
+        enabled,
     )  # fmt: skip
 
 
@@ -156,9 +152,8 @@ def _loss(p: Parameters, s: State, thrust: PerRotor, x: float, y: float, k: int)
 
 
 @always_inline
-def _accumulate(dt_and_least: tuple[float, float], evidence: float, loss: float) -> float:
-    dt, least = dt_and_least
-    return max(0.0, evidence + dt * (min(loss, 1.0) - least))
+def _accumulate(dt: float, evidence: float, loss: float) -> float:
+    return max(0.0, evidence + dt * (min(loss, 1.0) - LEAST_LOSS))
 
 
 @always_inline
@@ -211,10 +206,10 @@ def step(p: Parameters, s: State, dt: float, e: StateEstimate, height: float, co
     x, y = _disturbance(p, s.roll, mx, ax), _disturbance(p, s.pitch, my, ay)
     clipped = max(abs(wx), abs(wy)) > NEAR_RANGE * p.gyro_range  # the reading hides the acceleration
     losses = s.loss if clipped else map_index(_loss, p.roll, p, s, thrust, x, y)
-    evidence = map_tuple(_accumulate, (dt, p.least_loss), s.evidence, losses)
+    evidence = map_tuple(_accumulate, dt, s.evidence, losses)
     largest, failed = ALARM, 0
     for k in range(len(losses)):
-        if losses[k] > p.least_loss:
+        if losses[k] > LEAST_LOSS:
             learned = CAUTION * dt / LEARNING_TIME
         if evidence[k] > largest and p.enabled:
             largest, failed = evidence[k], k + 1

@@ -48,7 +48,7 @@ class LandingTable(BaseModel):
     ground_force: float = Field(default=0.25, gt=0.0, lt=1.0)  # of the weight, the least force of the ground
     vertical_speed: float = Field(default=0.2, gt=0.0, le=1.0)  # [m/s] above which there is no contact
     hold_time: float = Field(default=0.1, gt=0.0, le=5.0)  # [s] of contact before the motors ramp down
-    ramp_time: float = Field(default=0.6, gt=0.0, le=5.0)  # [s] from the full thrust command to none
+    ramp_time: float = Field(default=0.6, gt=0.0, le=5.0)  # [s] from 60 % of the thrust command to none
 
 
 class Autopilot(FirmwareKeys):

@@ -119,7 +119,8 @@ def test_hard_touch_is_crash_and_lists_later_accidents():
     contact = (T < 1.0) | (T >= 4.0)
     fast = np.where(contact, 0.0, -5.3)[:, None] * UP
     outcome = fly(velocity=fast, **{"pose.orientation": turned})
-    assert str(outcome).startswith("Crashed at 4.00 s: hit the ground at 5.30 m/s; tipped over 0.21 s later; ends at")
+    text = "Crashed at 4.00 s: hit the ground at 5.30 m/s; tipped over 0.21 s later; ends tilted by 180° at"
+    assert str(outcome).startswith(text)
 
 
 @pytest.mark.parametrize(

@@ -67,6 +67,44 @@ def test_crash_after_motor_failure_names_the_motor_first(lapwing):
     assert causes[-1][1].startswith("hit the ground at ")
 
 
+WALL = 'environment.terrain.box=[{position=[%s, 0.0], size=[2.0, 8.0], top=9.0, name="garage"}]'
+AHEAD = 'trajectory.phase.1.x={kind="minimum_jerk", to=8.0, duration=3.0}'
+ALL = {  # one set of effects, so that the kernels compile once
+    "effects.rotor_damage": "{rotor=2, time=100.0}",
+    "effects.wind_gust": "{peak=[0.0, 0.0, 0.0], start=3.0, duration=2.0}",
+    "effects.battery": "{}",
+    "effects.body_drag": "{area=[0.3, 0.3, 0.3]}",
+}
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("settings", "exit_code", "mark", "text"),
+    [
+        (
+            ["effects.rotor_damage.time=4.0", WALL % 4.0, AHEAD], 4, "bad",
+            r"^Crashed at 4.2\d s: rotor 2 keeps 0 % of its thrust at 4\.00 s; hit garage \(wall\), 0\.8 m above ",
+        ),
+        (
+            ["effects.wind_gust.peak=[20.0, 0.0, 0.0]", WALL % 1.75], 0, "warn",
+            r"^Landed at .* hit garage \(wall\), \S+ m above ground, at 0\.\d+ m/s, at 4\.\d\d s; ends at ",
+        ),
+        (
+            ["effects.battery={initial_charge=0.05, cutoff_voltage=3.7}", WALL % 50.0], 4, "warn",
+            r"never left the ground; the battery switched off: all rotors lost thrust at 0\.00 s; failsafe \(",
+        ),
+        ([WALL % 4.0, AHEAD], 4, "bad", r"hit garage \(wall\), .* m/s; turned over .* later; ends tilted by \d+° at "),
+    ],
+    ids=["lost rotor before a wall", "gust into a wall", "battery that switches off", "lies on its side"],
+)  # fmt: skip
+def test_causes_are_named_in_their_order(lapwing, settings, exit_code, mark, text):
+    sets = [f"{key}={value}" for key, value in ALL.items()] + settings
+    code, out, err = lapwing("run", "hover", *SINGLE, *[part for item in sets for part in ("--set", item)])
+    outcome = json.loads(Path("a.json").read_text())["outcome"]
+    assert (code, outcome["mark"]) == (exit_code, mark), (out, err)
+    assert re.search(text, outcome["text"]), outcome["text"]
+
+
 @pytest.mark.long
 def test_crash_into_another_vehicle_names_it(lapwing):
     vehicles = [

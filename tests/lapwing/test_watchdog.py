@@ -101,6 +101,43 @@ def test_signal_ends_run_whose_block_hangs(tmp_path, record_property, mode, hang
         assert ("digest" in log.metadata) == whole
 
 
+COMPILER = """
+import sys
+from pathlib import Path
+from lapwing.cli.entry_point import main
+from lapwing.kernels.compiler import cache
+
+def load(self, *arguments):  # a compilation that holds the GIL
+    for listener in cache._listeners:
+        listener("kernel")
+    if cache._listeners:
+        Path("compiles").touch()
+        sum(range(10**15))
+    return found(self, *arguments)
+
+found, cache.KernelCache.load_overload = cache.KernelCache.load_overload, load
+main()
+"""
+SERVICES = "compiling kernels of plant, autopilot, trajectory\n"
+
+
+@pytest.mark.long
+@pytest.mark.parametrize("mode", ["single-process", "multi-process"])
+def test_signal_ends_run_while_it_compiles(tmp_path, mode):
+    command = [sys.executable, "-c", COMPILER, "run", "hover", "--mode", mode]
+    environment = os.environ | {"PYTHONPATH": str(Path.cwd())}
+    run = subprocess.Popen(command, cwd=tmp_path, env=environment, stderr=subprocess.PIPE, text=True)
+    try:
+        while not (tmp_path / "compiles").exists():
+            assert run.poll() is None, run.stderr.read()
+            time.sleep(0.1)
+        run.send_signal(signal.SIGTERM)
+        error = run.communicate(timeout=TIMEOUT)[1]
+    finally:
+        run.kill()
+    assert (run.returncode, error) == (143, f"lapwing: ended by SIGTERM; {SERVICES}")
+
+
 @pytest.mark.long
 def test_signal_ends_command_that_hangs_before_the_run(tmp_path):
     code, error, _ = end(tmp_path, "library_with_gil", signal.SIGTERM, "run", "hover", calls="0")

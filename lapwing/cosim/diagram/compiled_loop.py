@@ -14,22 +14,34 @@ from numba.extending import intrinsic
 from lapwing.cosim.diagram.compiled_block import CONTINUE, FINISHED, NON_FINITE, WAKE_PYTHON, BoundBlock
 from lapwing.kernels import kernel
 
-IDLE = 0  # label while no block runs
+IDLE, COMPILING = 0, 1  # labels while no block runs, and while kernels compile before the first tick
 RUNNING = np.zeros(2, np.int64)
 """Label of the block that runs, and the number of ticks that this process has run so far."""
 NAMES = np.zeros((1 << 14, 64), np.uint8)
-"""Names of the blocks of this process by label, UTF-8, padded with zeros; the last is that of all further blocks."""
+"""Names of the blocks of this process by label, UTF-8, padded with zeros; the last is that of all further blocks.
+That of `COMPILING` has the services whose kernels compile."""
 NAMES[-1, :5] = list(b"other")
-_labels = {"": IDLE}
+_labels = {"": IDLE, "\0": COMPILING}
 
 
 def label(name: str) -> int:
     """Return the label of a block in this process."""
     number = _labels.setdefault(name, min(len(_labels), len(NAMES) - 1))
     if number < len(NAMES) - 1:
-        text = name.encode(errors="replace")[: NAMES.shape[1] - 1]
-        NAMES[number, : len(text)] = list(text)
+        _set_name(number, name)
     return number
+
+
+def _set_name(number: int, name: str) -> None:
+    text = name.encode(errors="replace")[: NAMES.shape[1] - 1]
+    NAMES[number] = list(text.ljust(NAMES.shape[1], b"\0"))
+
+
+def set_compiling(services: str) -> None:
+    """Set the services whose kernels compile in this process, "" after the compilation; no effect within a block."""
+    if RUNNING[0] in (IDLE, COMPILING):
+        _set_name(COMPILING, services)
+        RUNNING[0] = COMPILING if services else IDLE
 
 
 def running_block() -> str:

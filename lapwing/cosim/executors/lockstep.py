@@ -8,6 +8,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from lapwing.cosim.diagram.block_diagram import BlockDiagram, ExternalBlock, Service
+from lapwing.cosim.diagram.compiled_loop import set_compiling
 from lapwing.cosim.executors import realtime
 from lapwing.cosim.executors.log_backpressure import LogBackpressure
 from lapwing.cosim.executors.participant import Participant, Stopped
@@ -44,23 +45,24 @@ def run_lockstep(
         LockStepError: a message is missing or out of order, a state is invalid, or another participant ended early.
     """
     config = process.config
-    diagram = BlockDiagram(config, [service], 2 * PACKET_TICKS)
-    diagram.advance(0)  # steps no block, but compiles the loop over the blocks before the clock starts
-    receivers = packet_receivers(process, diagram)
-    sender = PacketSender(process, service, diagram)
-    backpressure = LogBackpressure(process, recorder) if owns_time else None
 
     def report_wait(text: str) -> None:
         if process.stopping:
             raise Stopped
         process.report_external_wait(text)
 
-    try:
-        with Watchdog(SERVICE_LIMIT, math.inf):
+    with Watchdog(SERVICE_LIMIT, math.inf):
+        diagram = BlockDiagram(config, [service], 2 * PACKET_TICKS)
+        try:
+            diagram.advance(0)  # steps no block, but compiles the loop over the blocks before the clock starts
+            set_compiling("")
+            receivers = packet_receivers(process, diagram)
+            sender = PacketSender(process, service, diagram)
+            backpressure = LogBackpressure(process, recorder) if owns_time else None
             diagram.open(report_wait, log)
             _run(process, diagram, receivers, sender, owns_time, backpressure)
-    finally:
-        diagram.close()
+        finally:
+            diagram.close()
 
 
 def _run(

@@ -8,6 +8,7 @@ from lapwing.cosim.access.publisher_ids import PublisherIds
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.config.serialise import compress, decompress, first_difference, from_json, to_json
 from lapwing.cosim.diagram.block_diagram import Service
+from lapwing.cosim.diagram.compiled_loop import set_compiling
 from lapwing.cosim.executors.peer_tracker import PeerTracker
 from lapwing.cosim.executors.stop_request import Stopped, StopRequest
 from lapwing.cosim.run_errors import LockStepError
@@ -99,6 +100,7 @@ class Participant(StopRequest):
     def _report_compiling(self, _: str) -> None:
         if not self._compiling:
             self._compiling = True
+            set_compiling(self.name)
             self.publish_status(COMPILING_KEY)
 
     def publish_status(self, key: str, text: str = "") -> None:

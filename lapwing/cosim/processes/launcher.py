@@ -91,10 +91,10 @@ def launch(
                     if name in children and (code := children[name].process.poll()) is not None:
                         exited[name] = code
                 _request_end(children.values())  # before this session closes, which takes a while
-        hung = _end(children)
-        if monitor.start is None and monitor.compiling:
-            hung = {}  # they were ended while they compiled
-        named = [f"{name}: {text}" for name, text in hung.items() if name in required]
+        hung = {name: text for name, text in _end(children).items() if name in required}
+        named = [f"{name}: {text}" for name, text in hung.items()]
+        if monitor.start is None and monitor.compiling:  # not to end while it compiles is no fault of a service
+            named = [f"compiling kernels of {', '.join(hung)}"] if hung and error is None else []
         if named:
             raise RunFailed("; ".join([*([str(error)] if error else []), *named]))
         if error:

@@ -16,7 +16,7 @@ from typing import NamedTuple, Self
 import numba
 import numpy as np
 
-from lapwing.cosim.diagram.compiled_loop import IDLE, NAMES, RUNNING
+from lapwing.cosim.diagram.compiled_loop import COMPILING, IDLE, NAMES, RUNNING
 from lapwing.cosim.processes.interrupt import ENDING, Interrupted
 from lapwing.cosim.processes.patience import EXTENSION
 from lapwing.kernels import always_inline, kernel
@@ -50,16 +50,16 @@ class Watch(NamedTuple):
     running: np.ndarray  # `RUNNING`
     names: np.ndarray  # `NAMES`
     prefixes: np.ndarray  # (n, m) uint8, by signal, padded with zeros: start of the line; empty for others
-    words: np.ndarray  # (3, m) uint8: before and after the name of a block, and in place of them
-    limit: float  # [s] for a block
+    words: np.ndarray  # (4, m) uint8: around the name of a block, in place of it, and before compiling services
+    limit: float  # [s] for a block, or for the compilation
     idle_limit: float  # [s] while no block runs
 
 
 class Watchdog:
     """Context manager: during the block, a signal that does not end this process makes the watchdog end it.
 
-    The process ends by exit code 128 + signal, with one line on standard error that names the block that runs. A loop
-    whose ticks advance is not ended.
+    The process ends by exit code 128 + signal, with one line on standard error that names the block that runs, or the
+    services whose kernels compile. A loop whose ticks advance is not ended.
     """
 
     _thread: threading.Thread | None = None
@@ -109,7 +109,7 @@ def _watch_data(pipe: int, limit: float, idle_limit: float) -> Watch:
     except OSError:  # the system has no such file
         schedule = -1
     starts = [f"lapwing: {Interrupted(n)}; " if n in ENDING else "" for n in range(signal.NSIG)]
-    words = _table(["block ", " did not return\n", "the program did not end by itself\n"])
+    words = _table(["block ", " did not return\n", "the program did not end by itself\n", "compiling kernels of "])
     arrays = [poll_entry(pipe), np.zeros(64, np.uint8), np.zeros(2, np.int64), np.zeros(256, np.uint8)]
     functions = (libc.read, libc.pread, libc.poll, libc.write, libc._exit, libc.clock_gettime)
     addressed = [part for array in arrays for part in (array, array.ctypes.data)]
@@ -163,6 +163,11 @@ def _report(w: Watch, number: int) -> None:
     size, block = _append(w, 0, w.prefixes[number]), w.running[0]
     if block == IDLE:
         size = _append(w, size, w.words[2])
+    elif block == COMPILING:
+        size = _append(w, size, w.words[3])
+        size = _append(w, size, w.names[block])
+        w.line[size] = 10  # end of the line
+        size += 1
     else:
         size = _append(w, size, w.words[0])
         size = _append(w, size, w.names[block])

@@ -12,7 +12,7 @@ from lapwing.kernels import always_inline, python_function
 from lapwing.kernels.cell import read
 from lapwing.kernels.codegen import generic
 from lapwing.services.autopilot import motor_failure
-from lapwing.services.autopilot.block import Controller, block_outputs, motors_off, start_step
+from lapwing.services.autopilot.block import NO_READING, Controller, block_outputs, motors_off, start_step
 from lapwing.services.autopilot.custom.controller_output import (
     NO_WRENCH,
     ControllerOutput,
@@ -21,7 +21,7 @@ from lapwing.services.autopilot.custom.controller_output import (
     parse_controller_output,
 )
 from lapwing.services.autopilot.mixer import zero_thrust
-from lapwing.services.common.ports import PerRotor
+from lapwing.services.common.ports import BatteryReading, PerRotor
 
 
 class PythonControllerProxy(NamedTuple):
@@ -49,14 +49,14 @@ class CustomState(NamedTuple):
     held: ControllerOutput  # last output of the user's controller
     failure_detector: motor_failure.State
     still_from: int  # [tick]
-    charge: float  # charge of the battery, fraction; NaN: unknown
+    battery: BatteryReading
 
 
 def start(p: CustomController) -> CustomState:
     """Return the initial state."""
     parameters = read(p.common.failure_detector)
     held, detector = no_output(len(parameters.roll)), python_function(motor_failure.start)(parameters)
-    return CustomState(p.own_start, held, detector, 0, float("nan"))
+    return CustomState(p.own_start, held, detector, 0, NO_READING)
 
 
 @always_inline
@@ -102,4 +102,4 @@ def step(
         failed = i.failure_detector.failed
         motor_command = command(law, p.lift, p.moments, p.voltage_max, held, setpoint.yaw, failed)
     detector, outputs = block_outputs(c, i, motor_command)
-    return CustomState(own, held, detector, i.still_from, i.charge), outputs, CONTINUE
+    return CustomState(own, held, detector, i.still_from, i.battery), outputs, CONTINUE

@@ -16,6 +16,7 @@ from lapwing.services.autopilot.land_detector import (
     INITIAL_LANDED_STATE,
     LANDED,
     ON_GROUND,
+    SETTLING,
     LandedState,
     Parameters,
     Thresholds,
@@ -66,10 +67,11 @@ def test_contact_ramps_the_motors_down_after_its_time():
     detector = Detector()
     before = LIMITS.hold_time + 0.02  # the filter of the force adds a part of its time constant
     assert detector.run(before, lift=0.3) == FLYING
-    assert min(detector.powers) > 0.9
+    assert min(detector.powers) > 0.99 * SETTLING
     assert detector.run(LIMITS.ramp_time - 0.08, lift=0.3) == FLYING
     assert detector.powers == sorted(detector.powers, reverse=True)  # a ramp, no cut
-    assert max(a - b for a, b in pairwise(detector.powers)) < 1.01 * DT / LIMITS.ramp_time
+    ramp = [power for power in detector.powers if power < 1.0]
+    assert max(a - b for a, b in pairwise(ramp)) < 1.01 * SETTLING * DT / LIMITS.ramp_time
     assert detector.run(0.1, lift=0.3) == LANDED
 
 
@@ -111,7 +113,7 @@ def test_bounce_starts_the_time_again_and_gives_the_thrust_back():
     detector = Detector()
     detector.run(LIMITS.hold_time + 0.2, lift=0.3)
     assert detector.state.power < 1.0
-    detector.run(0.35, lift=0.3, force=0.1, climb=-0.1)  # in the air again, longer than the contact
+    detector.run(0.5, lift=0.3, force=0.1, climb=-0.1)  # in the air again, longer than the contact
     assert detector.state.power == 1.0
     assert detector.run(LIMITS.hold_time, lift=0.3) == FLYING
     assert detector.run(LIMITS.ramp_time + 0.1, lift=0.3) == LANDED
@@ -122,7 +124,7 @@ def test_fall_ends_a_ramp():
     detector = Detector()
     detector.run(LIMITS.hold_time + 0.2, lift=0.3)
     assert detector.state.power < 1.0
-    detector.run(0.25, lift=0.3, climb=-2.1)
+    detector.run(0.35, lift=0.3, climb=-2.1)
     assert detector.state.power == 1.0
 
 

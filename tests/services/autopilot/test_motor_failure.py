@@ -1,15 +1,19 @@
 """Motor failure detector on a body integrated in this test: signs, fractions of thrust, detection time."""
 
 from math import inf
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from lapwing.kernels import python_function
+from lapwing.services.autopilot import block
 from lapwing.services.autopilot import motor_failure as watch
+from lapwing.services.autopilot.commander.wakeup_conditions import BatteryThresholds
+from lapwing.services.autopilot.control import Command
 from lapwing.services.autopilot.controller_parameters import Airframe
-from lapwing.services.autopilot.motor import Motor
-from lapwing.services.common.ports import StateEstimate
+from lapwing.services.autopilot.motor import Motor, thrust_at
+from lapwing.services.common.ports import BatteryReading, Setpoint, StateEstimate
 
 ARM, TICK = 0.35, 0.004
 FRAME = Airframe(
@@ -194,3 +198,20 @@ def test_known_rotational_drag_is_no_loss_and_hides_none():
     assert campaign_config(np.ones(4), seconds=5.0, swing=0.5, drag=drag, frame=frame).failed == 0
     left = np.array([1.0, 0.0, 1.0, 1.0])
     assert campaign_config(left, seconds=0.5, drag=drag, frame=frame).failed == 2
+
+
+@pytest.mark.parametrize("volts", [0.8 * FRAME.voltage_max, FRAME.voltage_max])
+def test_detector_expects_no_more_thrust_than_the_battery_permits(volts):
+    """Two rotors at a limit that the commands exceed would seem to have lost thrust."""
+    p = watch.build(FRAME, inf, {})
+    law = SimpleNamespace(motor=FRAME.motor, resting_height=FRAME.resting_height)
+    cells = (SimpleNamespace(value=value) for value in (law, p, BatteryThresholds(0.2, 0.1, 0.05)))
+    most = python_function(thrust_at)(FRAME.motor, FRAME.voltage_max)
+    command = Command((FRAME.voltage_max,) * 4, (most, 0.0, most, 0.5 * most), 0.0, 0.0, 0.0)
+    start = block.StepStart(
+        StateEstimate(), block.ControllerInput(), Setpoint(), block.FLYING, True, 1.0, False,
+        python_function(watch.start)(p), 0, BatteryReading(0.5, volts),
+    )  # fmt: skip
+    detector, _ = block.block_outputs.py_func(block.Controller(*cells, TICK, 0), start, command)
+    reached = (volts / FRAME.voltage_max) ** 2 * most
+    assert detector.commanded == pytest.approx((reached, 0.0, reached, 0.5 * most))
