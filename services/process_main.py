@@ -146,13 +146,13 @@ def import_ahead(names: Iterable[str]) -> None:
 
 
 def _operator_commands(process: Any) -> dict[str, Any]:
-    """Return a source of operator commands by vehicle, for the commands of the MAVLink and ROS 2 processes."""
+    """Return a source of operator commands by vehicle, for those of MAVLink, ROS 2 and the page of the run monitor."""
     from lapwing.services.common.operator_inbox import OPERATOR_KEY, OperatorInbox
     from lapwing.services.process_table import MAVLINK, ROS2
 
-    get = process.bus.receive(process.participants.senders(OPERATOR_KEY, [MAVLINK, ROS2])).get
-    mailbox = OperatorInbox(process.config.vehicles, lambda: get(0.0))
-    return {vehicle: partial(mailbox.take, vehicle) for vehicle in process.config.vehicles}
+    get = process.bus.receive(process.participants.senders(OPERATOR_KEY, [MAVLINK, ROS2, MONITOR])).get
+    vehicles, mailbox = process.config.vehicles, OperatorInbox(process.config.vehicles, lambda: get(0.0))
+    return {vehicle: partial(mailbox.take, vehicle) for vehicle in vehicles}
 
 
 def main(name: str) -> None:

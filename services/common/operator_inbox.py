@@ -1,12 +1,13 @@
 """Operator commands from outside the lock step, merged into one message per tick.
 
-The processes `mavlink` and `ros2` publish encoded OperatorInput messages on the key `_operator/NAME` below the run's
-key prefix at any time. The autopilot stamps and records them.
+The processes `mavlink` and `ros2`, and the run monitor for the page of `--view`, publish encoded OperatorInput messages
+on the key `_operator/NAME` below the run's key prefix at any time. The autopilot stamps and records them.
 """
 
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
+from lapwing.cosim.config.run_config import RunConfig
 from lapwing.messages import OperatorCommand, OperatorInput, header
 
 OPERATOR_KEY = "_operator"
@@ -19,6 +20,11 @@ Operator = Callable[[int], Iterable[OperatorCommand]]
 def no_operator(_: int) -> Iterable[OperatorCommand]:
     """Return no commands."""
     return ()
+
+
+def accepts_commands(member: RunConfig) -> bool:
+    """Return True if the autopilot of a vehicle, of whose run configuration alone, accepts commands."""
+    return "autopilot" in member.services and bool(member.services["autopilot"].parameters.operator)
 
 
 class OperatorInbox:

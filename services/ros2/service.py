@@ -11,7 +11,7 @@ from lapwing.cosim.executors.participant import POLL, Participant
 from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.messages import OperatorInput, header
 from lapwing.messages.topics import EVENTS, of_vehicle
-from lapwing.services.common.operator_inbox import OPERATOR_KEY
+from lapwing.services.common.operator_inbox import OPERATOR_KEY, accepts_commands
 from lapwing.services.ros2.commands import Commands
 from lapwing.services.ros2.node import Node
 
@@ -71,5 +71,4 @@ def run(process: Participant, spec: Any) -> None:
 
 def _commands(config: RunConfig) -> list[Commands]:
     """Return the conversions of all vehicles with `autopilot.accept_commands`."""
-    with_autopilot = [member for member in members(config) if "autopilot" in member.services]
-    return [Commands(member.vehicle) for member in with_autopilot if member.services["autopilot"].parameters.operator]
+    return [Commands(member.vehicle) for member in members(config) if accepts_commands(member)]
