@@ -253,7 +253,8 @@ def _fly(options: RunOptions, spec: "ProcessSpec", log: Path, early: dict[str, C
             from lapwing.runs.multi_process_run import fly_processes
 
             fly = partial(fly_processes, spec, display, auxiliary, early=early)
-        displays, observers = [], []
+        displays = []
+        observers = []
         if options.view:
             import webbrowser
 

@@ -105,10 +105,11 @@ class LivePage:
 
     def _take_sticks(self, query: str) -> bool:
         """Publish the command of a request of the page; return False if it is invalid."""
+        fields = parse_qs(query)
         try:
-            ((vehicle,), (kind,), values) = map(parse_qs(query).get, ("vehicle", "kind", "values"))
-            numbers = tuple(map(float, values[0].split(","))) if values else ()
-        except (TypeError, ValueError):
+            (vehicle,), (kind,) = fields["vehicle"], fields["kind"]
+            numbers = tuple(float(text) for values in fields.get("values", []) for text in values.split(","))
+        except (KeyError, ValueError):
             return False
         if vehicle not in self.operated or kind not in COMMANDS or len(numbers) != (4 if kind == "manual" else 0):
             return False
