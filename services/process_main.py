@@ -18,6 +18,7 @@ from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.cosim.run_errors import BusError, ExitCode, LockStepError
 
 _LENGTH = struct.Struct("<Q")
+ANSWER_TIMEOUT = 60.0  # [s] for the command of a ROS 2 node in lock step
 LONGEST = 15  # [characters] limit of a process's name
 
 
@@ -120,7 +121,8 @@ def run_participant(spec: ProcessSpec) -> ExitCode:
             if encoded:
                 run_encoder(process, process_table.create(config, encoded))
             elif entry.lock_step:
-                operators = _operator_commands(process) if spec.name == "autopilot" else {}
+                waits = spec.ros2 is not None and config.resolved.get("ros2", {}).get("lock_step", False)
+                operators = _operator_commands(process, waits) if spec.name == "autopilot" else {}
                 service = process_table.create(config, spec.name, operators)
                 owns_time, log = spec.name == process_table.CLOCK_OWNER, Path(spec.log) if spec.log else None
                 run_lockstep(process, service, owns_time, process_table.RECORDER, log)
@@ -145,14 +147,18 @@ def import_ahead(names: Iterable[str]) -> None:
         process_table.entry(process_table.service_of_encoder(name) or name).service()
 
 
-def _operator_commands(process: Any) -> dict[str, Any]:
-    """Return a source of operator commands by vehicle, for the commands of the MAVLink and ROS 2 processes."""
-    from lapwing.services.common.operator_inbox import OPERATOR_KEY, OperatorInbox
+def _operator_commands(process: Any, waits: bool) -> dict[str, Any]:
+    """Return a source of operator commands by vehicle, for those of MAVLink, ROS 2 and the page of the run monitor."""
+    from lapwing.services.common.operator_inbox import OPERATOR_KEY, AnsweredInbox, OperatorInbox
     from lapwing.services.process_table import MAVLINK, ROS2
 
-    get = process.bus.receive(process.participants.senders(OPERATOR_KEY, [MAVLINK, ROS2])).get
-    mailbox = OperatorInbox(process.config.vehicles, lambda: get(0.0))
-    return {vehicle: partial(mailbox.take, vehicle) for vehicle in process.config.vehicles}
+    get = process.bus.receive(process.participants.senders(OPERATOR_KEY, [MAVLINK, ROS2, MONITOR])).get
+    vehicles, mailbox = process.config.vehicles, OperatorInbox(process.config.vehicles, lambda: get(0.0))
+    if waits:
+        period = process.config.rate // process.config.resolved["rates"]["commands"]
+        wait = partial(process.wait_for_outside, get, ANSWER_TIMEOUT)
+        mailbox = AnsweredInbox(vehicles, wait, process.config.interval_ns, period)
+    return {vehicle: partial(mailbox.take, vehicle) for vehicle in vehicles}
 
 
 def main(name: str) -> None:

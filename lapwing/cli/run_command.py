@@ -254,6 +254,7 @@ def _fly(options: RunOptions, spec: "ProcessSpec", log: Path, early: dict[str, C
 
             fly = partial(fly_processes, spec, display, auxiliary, early=early)
         displays = []
+        observers = []
         if options.view:
             import webbrowser
 
@@ -261,10 +262,14 @@ def _fly(options: RunOptions, spec: "ProcessSpec", log: Path, early: dict[str, C
 
             page = stack.enter_context(LivePage(config))
             display.say(f"live: {page.address}")
+            if page.operated:
+                display.say("fly it in that page: arrows and W A S D or a gamepad; T takes off, L lands, R returns")
             webbrowser.open(page.address)
             displays.append(page.show)
+            observers.append(page.follow)
         if not (displays or FOXGLOVE in auxiliary or ROS2 in auxiliary):
             return fly()
         from lapwing.views.live.live_feed import LiveFeed
 
-        return fly(live=LiveFeed(config, displays).observe)
+        observers.append(LiveFeed(config, displays).observe)
+        return fly(live=lambda watch: [observe(watch) for observe in observers])

@@ -60,10 +60,12 @@ def performance(
 
     Published values are shown next to the computed ones.
     """
-    from lapwing.studies import performance as study
+    from lapwing.studies.performance import card
+    from lapwing.views.studies import study_result
+    from lapwing.views.studies.performance_result import result
     from lapwing.views.terminal import console
 
-    _study("SCENE|VEHICLE", subject, json, None, console(), lambda: study.card(subject), study)
+    _study("SCENE|VEHICLE", subject, json, None, console(), lambda: result(subject, card(subject)), study_result)
 
 
 @app.command()

@@ -24,6 +24,8 @@ LONGEST = 60  # shown characters of an invalid value
 def validated(validate: Callable[[Any], T], table: Any, model: type) -> T:
     """Return the validated table; a number may also be a text with a unit of its kind, for example "30 deg".
 
+    An angle may also be in degrees, by a key with the ending "_deg": `heading_deg = 30` instead of `heading`.
+
     Args:
         validate: function of pydantic for the table.
         table: mapping or list of plain data, which is not changed.
@@ -38,12 +40,37 @@ def validated(validate: Callable[[Any], T], table: Any, model: type) -> T:
         except ValidationError as error:
             converted = table
             for each in error.errors():
-                if each["type"] in OF_NUMBERS and isinstance(each["input"], str):
+                if each["type"] in UNKNOWN_KEY:
+                    converted = _in_degrees(converted, each["loc"], model)
+                elif each["type"] in OF_NUMBERS and isinstance(each["input"], str):
                     number = units.parse(each["input"], _unit(model, each["loc"]).strip(" []"))
                     converted = converted if number is None else _replaced(converted, each["loc"], number)
             if converted is table:
                 raise fault(error, model) from None
             table = converted
+
+
+def _in_degrees(value: Any, location: Sequence[str | int], model: Any) -> Any:
+    """Return plain data with `heading = "30 deg"` for `heading_deg = 30` at a location; the data itself for other keys.
+
+    Raises:
+        ConfigError: both keys are given; its key is relative to the data.
+    """
+    first, *rest = location
+    if rest:
+        try:
+            inner = value[first]
+        except (KeyError, IndexError, TypeError):  # the name of a member of a union
+            return value
+        return _replaced(value, [first], _in_degrees(inner, rest, follow(model, [first])))
+    base = str(first).removesuffix("_deg")
+    if base == first or "deg" not in units.UNITS.get(_unit(model, [base]).strip(" []"), {}):
+        return value
+    if base in value:
+        raise ConfigError(str(first), f"got {base} and {first}", "one of them")
+    number = value[first]
+    text = f"{number!r} deg" if type(number) in (int, float) else number
+    return {**{key: item for key, item in value.items() if key != first}, base: text}
 
 
 def _replaced(value: Any, location: Sequence[str | int], new: float) -> Any:

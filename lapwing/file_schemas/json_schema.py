@@ -85,7 +85,7 @@ def scene_schema() -> Schema:
             "anyOf": [segment, {"type": "array", "items": segment}],
         }
     for axis, figure in tables["published"]["properties"]["rmse"]["properties"].items():
-        figure["description"] = f"[{'m' if axis in 'xyz' else 'rad'}] published tracking error along or about this axis"
+        figure["description"] = f"published tracking error {'along this axis, in m' if axis in 'xyz' else 'in rad'}"
     vehicles = [tables["vehicle"], _fleet(tables, sections)]
     tables["vehicle"] = {"description": vehicles[0]["description"], "anyOf": vehicles}
     needed = [name for name, table in tables.items() if "required" in table and not sections[name].OPTIONAL]
@@ -104,7 +104,10 @@ def gains_schema() -> Schema:
 
 
 def with_units(node: Any, unit: str = "") -> Any:
-    """Return a schema in which numbers may be texts with a unit, such as "30 deg"; `unit` is that of the whole node."""
+    """Return a schema in which numbers may be texts with a unit, such as "30 deg", and keys of angles end in `_deg`.
+
+    `unit` is that of the whole node.
+    """
     if isinstance(node, list):
         return [with_units(item) for item in node]
     if not isinstance(node, dict):
@@ -116,6 +119,15 @@ def with_units(node: Any, unit: str = "") -> Any:
     if node.get("type") == "number" and unit in UNITS:
         names = "|".join(map(re.escape, UNITS[unit]))
         inner |= {"type": ["number", "string"], "pattern": rf"^[+-]?[0-9.]+(e[+-]?[0-9]+)? *({names})$"}
+    for name, part in node.get("properties", {}).items():
+        if part.get("type") == "number" and part.get("description", "").startswith(("[rad]", "[u]")):
+            in_degrees = {"type": "number", "description": f"[deg] {name} in degrees"}
+            inner["properties"][f"{name}_deg"] = with_units(in_degrees)
+            either: Schema = {"not": {"required": [name, f"{name}_deg"]}}
+            if name in node.get("required", ()):
+                inner["required"] = [other for other in inner["required"] if other != name]
+                either = {"oneOf": [required_keys([name]), required_keys([f"{name}_deg"])]}
+            inner["allOf"] = [*inner.get("allOf", ()), either]
     return inner
 
 

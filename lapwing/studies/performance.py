@@ -6,9 +6,6 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from rich.console import Console
-from rich.table import Table
-
 from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.input_file import read_text
 from lapwing.dynamics.vehicles import hover_loads, performance
@@ -21,7 +18,6 @@ from lapwing.services.autopilot.allocation import (
 )
 from lapwing.services.common.schemas.vehicle_schema import airframe, rotor_constants
 from lapwing.services.scene_resolver import load
-from lapwing.studies.json_file import write_json  # noqa: F401 (part of the interface of a study)
 
 
 class Row(NamedTuple):
@@ -127,28 +123,3 @@ def _vehicle(subject: Path) -> tuple[Airframe, performance.Rotor]:
     scene = load(subject)
     frame, rotor = airframe(scene), rotor_constants(scene)
     return frame, performance.rotor_of(frame) if rotor.with_density else performance.Rotor(*rotor)
-
-
-def show(console: Console, rows: list[Row]) -> None:
-    """Print the card."""
-    source = rows[0].source
-    table = Table(show_lines=bool(source))
-    table.add_column("figure")
-    table.add_column("computed", justify="right")
-    if source:
-        table.add_column(source, justify="right")
-    if any(row.reason for row in rows):
-        table.add_column("reason for difference" if source else "reason")
-    for row in rows:
-        cells = [f"{row.name} [{row.unit}]", _number(row.computed)]
-        if source:
-            cells.append(_number(row.published))
-        table.add_row(*cells, *([row.reason] if len(table.columns) > len(cells) else []))
-    console.print(table)
-
-
-def _number(value: float | None) -> str:
-    """Return a text of three significant digits, without an exponent below a million; "" for None."""
-    if value is None:
-        return ""
-    return f"{value:.0f}" if 100.0 <= abs(value) < 1e6 else f"{value:.3g}"

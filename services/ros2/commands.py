@@ -18,6 +18,7 @@ from lapwing.messages import (
     Setpoint,
     String,
     TwistStamped,
+    stamp_ns,
 )
 
 SOURCE = "ros2"
@@ -83,6 +84,14 @@ class Commands:
         self.accepted_count, self.rejected_count = 0, 0
         self.last_error = ""
         self._numbers = itertools.count(1)
+
+    def stamp(self, topic: str, payload: bytes) -> int:
+        """Return the time stamp of a message [ns]; 0 without one."""
+        try:
+            message = self.messages[topic].decode(payload)
+        except ValueError:
+            return 0
+        return stamp_ns(message.header) if hasattr(message, "header") else 0
 
     def read(self, topic: str, payload: bytes) -> tuple[Any, ...]:
         """Return the commands of a message; () if it is rejected."""

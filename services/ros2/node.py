@@ -185,6 +185,17 @@ class Node:
         if topic in self._puts:
             self._puts[topic](payload, time_ns)
 
+    def publishers(self) -> set[str]:
+        """Return a set of the topics that other nodes publish, which grows while nodes appear."""
+        topics: set[str] = set()
+
+        def note(token: str, alive: bool) -> None:
+            if alive and token.split("/")[5:6] == [PUBLISHER]:
+                topics.add(token.split("/")[9].replace("%", "/"))
+
+        self._bus.watch_liveliness(f"@ros2_lv/{self._domain}/**", note)
+        return topics
+
     def subscribe(self, messages: dict[str, Any]) -> "CommandSubscription":
         """Subscribe to topics of other nodes; `messages` has the message class by topic."""
         endpoints = [Endpoint(topic, message.type_name) for topic, message in messages.items()]

@@ -15,3 +15,4 @@ class Ros2(SceneTable):
     OPTIONAL: ClassVar[bool] = True
     enabled: bool = False  # publish for ROS 2 nodes, as the option --ros2 does
     domain_id: int = Field(default=0, ge=0, le=232)  # ROS_DOMAIN_ID of the nodes
+    lock_step: bool = False  # the run waits, at each tick of rates.commands, for the command that a node stamps with it

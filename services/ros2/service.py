@@ -1,8 +1,10 @@
 """ROS 2 node of a run: publishes the messages of the services, and receives commands.
 
-It is not part of the lock step: no service waits for it, and the flight continues when it ends.
+It is not part of the lock step: no service waits for it, and the flight continues when it ends. With `ros2.lock_step`
+the run begins when a node publishes a command topic, and the autopilot waits for its answers (`AnsweredInbox`).
 """
 
+import time
 from typing import Any
 
 from lapwing.cosim.config.run_config import RunConfig
@@ -11,9 +13,11 @@ from lapwing.cosim.executors.participant import POLL, Participant
 from lapwing.cosim.processes.run_monitor import MONITOR
 from lapwing.messages import OperatorInput, header
 from lapwing.messages.topics import EVENTS, of_vehicle
-from lapwing.services.common.operator_inbox import OPERATOR_KEY
+from lapwing.services.common.operator_inbox import OPERATOR_KEY, accepts_commands
 from lapwing.services.ros2.commands import Commands
 from lapwing.services.ros2.node import Node
+
+BRIEF = 0.001  # [s] between two looks for answers of nodes in lock step
 
 
 def run(process: Participant, spec: Any) -> None:
@@ -45,6 +49,14 @@ def run(process: Participant, spec: Any) -> None:
         )
         event_senders = dict.fromkeys(events, process.participants.gid(MONITOR))  # the run monitor publishes events
         published = process.bus.receive(senders | event_senders)
+        lock_step, published_elsewhere = config.resolved.get("ros2", {}).get("lock_step", False), node.publishers()
+        while (
+            lock_step
+            and commands_by_topic
+            and not process.stopping
+            and not any(topic in commands_by_topic for topic in published_elsewhere.copy())
+        ):
+            time.sleep(POLL)
         process.join()
         unfinished = set(topics)  # topics that have not ended
         topics |= events
@@ -52,9 +64,9 @@ def run(process: Participant, spec: Any) -> None:
         while (unfinished or open_events) and not process.stopping:
             while received := subscription.get():
                 commands = commands_by_topic[received[0]]
-                for command in commands.read(*received):
-                    operate(OperatorInput(header(0, commands.vehicle), (command,)).encode(), 0)
-            message = published.get_with_key(POLL)
+                stamp = commands.stamp(*received) if lock_step else 0
+                operate(OperatorInput(header(0, commands.vehicle), commands.read(*received)).encode(), stamp)
+            message = published.get_with_key(BRIEF if lock_step else POLL)
             if message is None:
                 continue
             key, time_ns, payload = message
@@ -71,5 +83,4 @@ def run(process: Participant, spec: Any) -> None:
 
 def _commands(config: RunConfig) -> list[Commands]:
     """Return the conversions of all vehicles with `autopilot.accept_commands`."""
-    with_autopilot = [member for member in members(config) if "autopilot" in member.services]
-    return [Commands(member.vehicle) for member in with_autopilot if member.services["autopilot"].parameters.operator]
+    return [Commands(member.vehicle) for member in members(config) if accepts_commands(member)]

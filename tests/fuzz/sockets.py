@@ -69,7 +69,7 @@ def frames() -> Target:
 
 def page() -> Target:
     """Paths and headers of requests to the guard of the page of `lapwing run --view`."""
-    guard = Guard("token", None)
+    guard = Guard("token", None, lambda query: False)
     guard.hosts = {"127.0.0.1:8000"}
     guard.handler = lambda connection, request: None
     connection = SimpleNamespace(respond=lambda status, text: None)

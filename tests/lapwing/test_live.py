@@ -1,23 +1,29 @@
 """Live page of a run: access, and drawing in a browser."""
 
+import contextlib
 import os
 import re
 import socket
 import subprocess
 import sys
+import time
 import urllib.error
 import urllib.request
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from lapwing import read_log
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.executors.single_process import KEPT_TICKS
+from lapwing.kernels import cache_folder
 from lapwing.messages import Log
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.views.live.live_feed import LiveFeed
 from lapwing.views.view3d import headless as chromium
+from lapwing.views.view3d import recording
 
 pytest.importorskip("viser", reason="needs viser (pip install lapwing[view3d])")
 from lapwing.views.live.live_page import LivePage
@@ -173,3 +179,69 @@ def test_run_is_shown_from_command_line(tmp_path):
         rest = run.stdout.read()
         assert run.wait(PATIENCE) == 0
     assert "viser" not in rest
+
+
+INVALID = ("", "?vehicle=none&kind=arm", "?vehicle=drone1&kind=finish", "?vehicle=drone1&kind=manual&values=1,x")
+
+
+def test_sticks_of_the_page_fly_the_vehicle_and_the_flight_is_repeated(tmp_path):
+    log = tmp_path / "log.mcap"
+    command = [sys.executable, "-u", "-m", "lapwing", "run", "groundstation", "--view", "--log", str(log)]
+    for key in ("autopilot.estimator=ground_truth", "run.duration=14.0"):
+        command += ["--set", key]
+    environment = {**os.environ, "BROWSER": "true", "LAPWING_CACHE": str(cache_folder())}
+    with subprocess.Popen(command, stdout=subprocess.PIPE, text=True, env=environment) as run:
+        assert run.stdout is not None
+        address = next(match[1] for line in run.stdout if (match := re.search(r"live: (\S+)", line)))
+        assert '"sticks":["drone1"]' in get(address).read().decode()
+        for query in INVALID:
+            assert refused(f"{address}sticks{query}") == 400
+        assert refused(f"{address}sticks?vehicle=drone1&kind=arm", Origin="http://example.org") == 403
+        while run.poll() is None:  # forward and up, until the page is gone
+            for query in ("kind=arm", "kind=position_control", "kind=manual&values=1,0,0.5,0"):
+                with contextlib.suppress(OSError):
+                    get(f"{address}sticks?vehicle=drone1&{query}")
+            time.sleep(0.05)
+    position = read_log(log).truth.position
+    assert min(position[:, 0].max(), position[:, 2].max()) > 1.0
+    command = [sys.executable, "-m", "lapwing", "resimulate", str(log)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+STICKS = """<div id="lapwing"></div><script>
+const sent = [];
+window.fetch = async (address) => sent.push(new URLSearchParams(address.split("?")[1]));
+window.lapwing = { sticks: ["b"], names: ["a", "b"] };
+window.lapwingView = { vehicle: 1 };
+</script><script src="SCRIPT"></script>"""
+
+
+@pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
+def test_keys_and_gamepad_of_the_page_become_sticks(tmp_path):
+    page = tmp_path / "sticks.html"
+    script = Path(recording.__file__).parent / "sticks.js"
+    page.write_text(STICKS.replace("SCRIPT", script.as_uri()))
+    with chromium.Browser(page) as browser:
+        found = browser.run(
+            """
+            const wait = (seconds) => new Promise((done) => setTimeout(done, 1e3 * seconds));
+            const key = (kind, code) => dispatchEvent(new KeyboardEvent(kind, { code, cancelable: true }));
+            const until = async (values) => {
+              for (let k = 0; k < 300 && sent.at(-1)?.get("values") !== values; k++) await wait(0.05);
+              return sent.splice(0).map((each) => [...each.values()].join(" "));
+            };
+            while (document.readyState !== "complete") await wait(0.05);
+            await wait(0.5);
+            const before = sent.length;
+            key("keydown", "ArrowUp"), key("keydown", "KeyA");
+            const flown = await until("1,0,0,1");
+            key("keyup", "ArrowUp"), key("keyup", "KeyA"), key("keydown", "KeyL");
+            const landed = await until("0,0,0,0");
+            const pad = { connected: true, axes: [0, -0.5, 0.25, 0], buttons: [] };
+            navigator.getGamepads = () => [null, pad];
+            return [before, flown.slice(0, 3), landed.includes("b land "), (await until("0,-0.25,0.5,0")).slice(-1)];
+            """
+        )
+        assert browser.errors == []
+    assert found == [0, ["b position_control ", "b arm ", "b manual 1,0,0,1"], True, ["b manual 0,-0.25,0.5,0"]]

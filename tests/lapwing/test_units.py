@@ -1,6 +1,9 @@
 """Values with units in scenes: converted to the unit of their key, or rejected with it."""
 
+import copy
 import math
+import tomllib
+from pathlib import Path
 
 import jsonschema
 import pytest
@@ -12,6 +15,8 @@ from lapwing.file_schemas.descriptions import effect_settings
 from lapwing.file_schemas.json_schema import SCHEMAS
 from lapwing.services.scene_resolver import from_resolved, load, resolve
 from lapwing.services.trajectory.schema import Trajectory, compile_trajectory
+
+ROOT = Path(__file__).parents[2]
 
 
 @pytest.mark.parametrize(
@@ -70,6 +75,48 @@ def test_effect_and_sensor_have_converted_values():
     assert resolve(from_resolved(scene.resolved))
     settings = validate_table(effect_settings("wind_boundary_layer"), wind)
     assert (settings.speed, settings.roughness) == (pytest.approx(5.0), pytest.approx(0.03))
+
+
+HOUSE = {"position": [9.0, 0.0], "size": ["40 ft", 2.0], "top": 3.0}
+DEGREES = {  # table: the same in radians, with a text, and by a key with the unit
+    "effects.wind_boundary_layer": ({"speed": 5.0, "height": 10.0, "roughness": 0.03}, "direction_to"),
+    "environment.terrain.steps": ({"distance": [1.0], "rise": [0.5]}, "heading"),
+    "environment.terrain.box": ([HOUSE], "heading"),
+    "trajectory.phase.1.yaw": ({"kind": "minimum_jerk", "duration": 3.0}, "to"),
+}
+
+
+@pytest.mark.parametrize("table", DEGREES)
+def test_angle_has_the_same_value_in_radians_in_text_and_in_degrees(table):
+    keys, angle = DEGREES[table]
+    forms = [{angle: math.radians(30.0)}, {angle: "30 deg"}, {f"{angle}_deg": 30}, {f"{angle}_deg": "30 deg"}]
+    tables = [[keys[0] | form] if isinstance(keys, list) else keys | form for form in forms]
+    scenes = [load("hover", {table: one}) for one in tables]
+    configs = [resolve(scene).services for scene in scenes]
+    for config in configs[1:]:
+        assert repr(config) == repr(configs[0])
+    validator = jsonschema.Draft7Validator(SCHEMAS["scene"]())
+    tree = tomllib.loads((ROOT / "lapwing/scenes/hover.toml").read_text())
+    for one in tables:
+        assert [error.message for error in validator.iter_errors(_changed(tree, table, one))] == []
+    assert list(validator.iter_errors(_changed(tree, table, _both(tables[0], angle))))
+    with pytest.raises(SceneError, match=f"expected one of them, got {angle} and {angle}_deg"):
+        load("hover", {table: _both(tables[0], angle)})
+
+
+def _both(table, angle):
+    one = table[0] if isinstance(table, list) else table
+    one = one | {f"{angle}_deg": 30.0}
+    return [one] if isinstance(table, list) else one
+
+
+def _changed(tree, key, value):
+    tree = copy.deepcopy(tree)
+    at, (*parents, last) = tree, key.split(".")
+    for parent in parents:
+        at = at[int(parent)] if isinstance(at, list) else at.setdefault(parent, {})
+    at[last] = value
+    return tree
 
 
 @pytest.mark.parametrize(

@@ -16,8 +16,9 @@ from lapwing.services.autopilot.controller_parameters import rotor_effectiveness
 from lapwing.services.autopilot.controller_parameters import shares as law_shares
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.studies.json_file import write_json
-from lapwing.studies.performance import card, show
+from lapwing.studies.performance import card
+from lapwing.views.studies.performance_result import result
+from lapwing.views.studies.study_result import show, write_json
 from lapwing.views.terminal import console
 from tests.commands import run_command
 
@@ -51,8 +52,21 @@ def test_published_figures_have_reason_for_difference():
 
 
 def test_json(tmp_path):
-    write_json(tmp_path / "card.json", card(VEHICLE))
-    assert '"hover time"' in (tmp_path / "card.json").read_text()
+    write_json(tmp_path / "card.json", result(VEHICLE, card(VEHICLE)))
+    written = json.loads((tmp_path / "card.json").read_text())
+    figures = {figure["name"]: figure["computed"] for figure in written["figures"]}
+    assert written["mark"] == "good"
+    assert written["verdict"].startswith(
+        f"thrust over weight {figures['thrust over weight']:.3g}: it flies; hover time "
+    )
+
+
+@pytest.mark.parametrize(("mass", "mark"), [(10.0, "good"), (18.0, "warn"), (40.0, "bad")])
+def test_verdict_says_whether_the_vehicle_flies(tmp_path, mass, mark):
+    path = tmp_path / "heavy.toml"
+    path.write_text(re.sub(r"(?m)^total = .*$", f"total = {mass}", VEHICLE.read_text(), count=1))
+    verdict = result(path, card(path))
+    assert verdict.mark == mark, verdict.verdict
 
 
 def test_unknown_target_is_rejected(tmp_path):
@@ -72,11 +86,11 @@ def airframe_without(tmp_path, *tables):
 
 
 def test_units_are_printed_within_80_columns(capsys):
-    show(console(80), card(VEHICLE))
+    show(console(80), result(VEHICLE, card(VEHICLE)))
     output = capsys.readouterr().out
     assert "hover time [min]" in output
     assert "maximum speed [m/s]" in output
-    assert max(map(len, output.splitlines())) <= 80
+    assert max(map(len, output.splitlines()[1:])) <= 80  # below the verdict
 
 
 def test_card_without_drag_or_battery_is_partial(tmp_path, capsys):
@@ -86,7 +100,7 @@ def test_card_without_drag_or_battery_is_partial(tmp_path, capsys):
         assert rows[name].computed == whole[name].computed
     assert (rows["maximum speed"].computed, rows["maximum speed"].reason) == (None, "the vehicle has no [drag]")
     assert (rows["hover time"].computed, rows["hover time"].reason) == (None, "the vehicle has no [battery]")
-    show(console(80), list(rows.values()))
+    show(console(80), result(VEHICLE, list(rows.values())))
     assert "the vehicle has no [drag]" in capsys.readouterr().out
 
 
@@ -166,7 +180,7 @@ def test_shipped_vehicles_take_more_power_than_ideal_rotors(scene):
 @pytest.mark.long
 def test_command_prints_loads_and_margins_in_hover(tmp_path):
     result = run_command("performance", "quad_x", "--json", tmp_path / "card.json", code=0, COLUMNS="80")
-    rows = {row["name"]: row for row in json.loads((tmp_path / "card.json").read_text())}
+    rows = {row["name"]: row for row in json.loads((tmp_path / "card.json").read_text())["figures"]}
     for name, unit in {
         "hover power": "W",
         "hover current": "A",

@@ -9,6 +9,7 @@ import page_looks
 import pytest
 
 from lapwing.views import report
+from lapwing.views.report import write
 from lapwing.views.report.style import AXIS_COLOURS, BOUND, DARK, FLOWN
 from lapwing.views.view3d import headless as chromium
 
@@ -23,6 +24,7 @@ BLIND = {
     "protanopia": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
 }
 APART = 0.1  # distance in linear red, green, blue of two distinguishable colours
+PAPER = 703  # [pixel] width of A4 between its margins
 MEAN, WORST = 8.0, 70.0  # of 255: mean difference of pixels, and its 99th percentile; fonts differ
 
 
@@ -62,3 +64,21 @@ def test_report_matches_pictures_in_light_dark_and_on_phone():
         assert difference.mean() < MEAN, look
         assert np.quantile(difference.mean(axis=2), 0.99) < WORST, look
         assert page <= window, look
+
+
+@pytest.mark.long
+@pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
+def test_plots_fit_on_paper_and_in_the_window_again(tmp_path):
+    page = write(page_looks.flight(), tmp_path / "flight.html")
+    widths = "return [...document.querySelectorAll('.main-svg')].map((svg) => svg.getBoundingClientRect().width);"
+    with chromium.Browser(page, size=(1280, 900)) as browser:
+        browser.run(page_looks.DRAWN)
+        window = browser.run(widths)
+        browser.run("dispatchEvent(new Event('beforeprint')); await new Promise((done) => setTimeout(done, 2000));")
+        paper = browser.run(widths)
+        browser.run("dispatchEvent(new Event('afterprint')); await new Promise((done) => setTimeout(done, 2000));")
+        again = browser.run(widths)
+        assert browser.errors == []
+    assert max(paper) <= PAPER
+    assert len(paper) > len(window)  # those of closed sections, too
+    assert max(again) == max(window)

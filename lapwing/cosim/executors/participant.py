@@ -196,6 +196,22 @@ class Participant(StopRequest):
                 waited = 0.0
         raise Stopped
 
+    def wait_for_outside(self, get: Callable[[float], T | None], seconds: float, waiting_for: Callable[[], str]) -> T:
+        """Return the first result of `get(timeout)`, the answer of a program outside the run.
+
+        Raises:
+            Stopped: requested to stop.
+            LockStepError: no answer within `seconds`.
+        """
+        deadline = time.monotonic() + seconds
+        while not self.stopping:
+            if (result := get(POLL)) is not None:
+                return result
+            if time.monotonic() > deadline:
+                raise LockStepError(f"{self.name}: no answer within {seconds:g} s: {waiting_for()}")
+            self.report_external_wait(waiting_for())
+        raise Stopped
+
     def confirm(self) -> None:
         """Declare that this process has received the last message of each participant that it subscribes to.
 

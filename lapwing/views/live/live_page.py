@@ -4,18 +4,23 @@ import secrets
 import threading
 import time
 from collections import deque
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
+from functools import partial
 from typing import Self
+from urllib.parse import parse_qs
 
 import numpy as np
 
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.multi_vehicle import members
+from lapwing.cosim.processes.run_monitor import MONITOR, RunMonitor
 from lapwing.flights.flight_data import FlightData
 from lapwing.flights.flight_events import Event
 from lapwing.flights.flight_provenance import Origin
 from lapwing.flights.topic_view import TopicView
+from lapwing.messages import OperatorCommand, OperatorInput, header
+from lapwing.services.common.operator_inbox import OPERATOR_KEY, accepts_commands
 from lapwing.views.report.style import COLOURS, FLOWN
 from lapwing.views.view3d.bodies import LEVEL
 from lapwing.views.view3d.live_trail import LiveTrail
@@ -32,11 +37,17 @@ LINES = 200  # lines of events
 LAG = (0.02, 0.5)  # [s] shortest and longest time over which a step is spread
 ERROR = 0.25  # [m] upper end of the trail's colour scale
 SIZE = 1.0  # [m] size that sets the camera's distance
+SOURCE = "view"  # of the commands from the page
+COMMANDS = ("manual", "arm", "position_control", "takeoff", "land", "return")
 FLUSH_TIME = 0.3  # [s] time for browsers to receive the last frame
 
 
 class LivePage:
-    """Server of the 3D view of a run; a context manager that closes the sockets at its end."""
+    """Server of the 3D view of a run; a context manager that closes the sockets at its end.
+
+    Attributes:
+        operated: names of the vehicles that accept commands.
+    """
 
     def __init__(self, config: RunConfig):
         """Open the page before the run begins."""
@@ -44,9 +55,14 @@ class LivePage:
         names = list(config.vehicles)
         colours = [COLOURS[i % len(COLOURS)] for i in range(len(names))] if len(names) > 1 else [FLOWN]
         facts = {"names": names, "colours": colours, "size": SIZE, "start": 0.0, "error": ERROR, "live": True}
+        self.operated = [member.vehicle for member in members(config) if accepts_commands(member)]
+        facts["sticks"] = self.operated
+        self._operate: Callable[[int, bytes], None] | None = None  # publishes an OperatorInput during the flight
+        self._count = 0  # of commands
         self._colours = colours
         self._stack = ExitStack()
-        self._server = self._stack.enter_context(run_server(token, lambda html: with_bridge(html, facts)))
+        server = run_server(token, partial(with_bridge, facts=facts), self._take_sticks)
+        self._server = self._stack.enter_context(server)
         self.address = f"http://127.0.0.1:{self._server.get_port()}/{token}/"
         add_surroundings(self._server.scene, _before_start(members(config)[0]))
         add_shaders(self._server.scene)
@@ -82,6 +98,26 @@ class LivePage:
             for trail, step in zip(self._trails, steps, strict=True):
                 trail.extend(step)
             self._show_events(steps, events)
+
+    def follow(self, watch: RunMonitor) -> None:
+        """Send the commands of the page to this run until its end."""
+        self._operate = None if watch.complete else partial(watch.publish, f"{OPERATOR_KEY}/{MONITOR}")
+
+    def _take_sticks(self, query: str) -> bool:
+        """Publish the command of a request of the page; return False if it is invalid."""
+        fields = parse_qs(query)
+        try:
+            (vehicle,), (kind,) = fields["vehicle"], fields["kind"]
+            numbers = tuple(float(text) for values in fields.get("values", []) for text in values.split(","))
+        except (KeyError, ValueError):
+            return False
+        if vehicle not in self.operated or kind not in COMMANDS or len(numbers) != (4 if kind == "manual" else 0):
+            return False
+        self._count += 1
+        command = OperatorCommand(kind, SOURCE, self._count, numbers)
+        if self._operate:
+            self._operate(0, OperatorInput(header(0, vehicle), (command,)).encode())
+        return True
 
     def _show_events(self, steps: Sequence[FlightData], events: Sequence[list[Event]]) -> None:
         several = len(steps) > 1

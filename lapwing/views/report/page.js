@@ -3,6 +3,7 @@
   const config = { responsive: true, displaylogo: false, scrollZoom: false, toImageButtonOptions: { format: "svg" } };
   Object.assign(config, { modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"], displayModeBar: matchMedia("(hover: hover)").matches && "hover" });
   const NARROW = 600; // [pixel] width below which a plot has one column
+  const PAPER = 690; // [pixel] width of a plot on a page of A4
   const dark = DARK_COLOURS;
   const AROUND = [5, 10]; // [s] shown before and after a selected event
   const linked = []; // drawn plots over time: {box, axis}
@@ -122,8 +123,17 @@
     place?.scrollIntoView({ block: "center", behavior: "smooth" });
   });
 
+  function fit(width) { // fits the plots to a width [pixel], or to the window again
+    for (const figure of figures) {
+      const box = figure.querySelector("div");
+      figure.style.width = width ? `${width}px` : "";
+      if (!box.data) draw(figure);
+      else Plotly.relayout(box, width ? { width } : { width: null, autosize: true });
+    }
+  }
   window.addEventListener("beforeprint", () => {
     for (const details of document.querySelectorAll("details")) details.open ||= !details.contains(space);
-    figures.forEach(draw);
+    fit(PAPER);
   });
+  window.addEventListener("afterprint", () => fit(0));
 })();

@@ -10,7 +10,7 @@ from lapwing.cosim.scene.load import SCENE_FILE
 from lapwing.cosim.scene.toml_text import toml
 from lapwing.file_schemas.annotations import Schema, dereference
 
-FIRST = ("run", "vehicle", "trajectory", "effects", "sensors", "environment", "autopilot", "solver", "communication")
+FIRST = ("trajectory", "effects", "vehicle", "run", "environment", "sensors", "autopilot", "solver", "communication")
 PER_VEHICLE = ("airframe", "mavlink")  # tables of the single vehicles of a fleet
 OPEN = ("run", "vehicle", "effects", "trajectory")  # tables that are initially open
 HIDDEN = ("published", "services", "meshes", "ros2")  # tables without influence on the flight, or too large

@@ -31,12 +31,13 @@ from lapwing.views.studio.scene_forms import (
     scene_files,
     schema,
     tables,
+    toml_text,
 )
 from lapwing.views.view3d import MISSING as NO_VIEW
 from lapwing.views.view3d import available
 
 HERE = Path(__file__).parent
-STATIC = {"studio.js": "text/javascript", "studio.css": "text/css"}
+STATIC = {"studio.js": "text/javascript", "map.js": "text/javascript", "studio.css": "text/css"}
 MOST_COMPARED = 4  # largest number of flights in a comparison
 REPORT_POLICY = (  # a report runs its scripts in a sandbox with a separate origin and no network
     "sandbox allow-scripts allow-downloads; default-src data: blob: 'unsafe-inline' 'unsafe-eval'; "
@@ -164,11 +165,9 @@ class Pages:
         name, posted, added = await posted_form(request)
         changed, faults, error = await run_in_threadpool(form_changes, name, posted, added)
         command = command_line(name, changed, posted.get("speed", ""), posted.get("view") == "yes")
+        result = {"command": shlex.join(command), "python": python(name, changed), "toml": toml_text(name, changed)}
         keys = [change.key for change in changed]
-        code = python(name, changed)
-        return JSONResponse(
-            {"command": shlex.join(command), "python": code, "changed": keys, "faults": faults, "error": error}
-        )
+        return JSONResponse({**result, "changed": keys, "faults": faults, "error": error})
 
     async def start(self, request: Request) -> Response:
         """Start a run of a posted form and show it; show the form again if it has faults."""

@@ -12,7 +12,8 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
 from lapwing.cosim.scene import Scene, SceneError
-from lapwing.cosim.scene.toml_text import toml
+from lapwing.cosim.scene.overrides import with_values
+from lapwing.cosim.scene.toml_text import dump, toml
 from lapwing.file_schemas.annotations import Schema
 from lapwing.file_schemas.json_schema import scene_schema
 from lapwing.services.common.schemas.run_schema import SHIPPED
@@ -131,6 +132,21 @@ def load_named(name: str, changed: Iterable[Change] = ()) -> Scene:
     if name not in files:
         raise KeyError(name)
     return load(files[name], [change.override for change in changed])
+
+
+def toml_text(name: str, changed: Iterable[Change]) -> str:
+    """Return the changed values as tables of a scene file; a list with a changed entry is written as a whole."""
+    tree = with_values(tomllib.loads(scene_files()[name].read_text("utf-8")), [change.override for change in changed])
+    result: dict[str, Any] = {}
+    for change in changed:
+        source, target = tree, result
+        *parents, last = change.key.split(".")
+        for k, part in enumerate((*parents, last)):
+            if k == len(parents) or not isinstance(source[part], Mapping):
+                target[part] = source[part]
+                break
+            source, target = source[part], target.setdefault(part, {})
+    return dump(result).strip()
 
 
 def tables(keys: Iterable[str]) -> list[Change]:

@@ -24,6 +24,26 @@
     }
   });
 
+  // A flight that is dropped on another one is compared with it.
+  const nameIn = (card) => card?.querySelector("input[name=flight]")?.value;
+  const onCards = (kind, act) => document.addEventListener(kind, (event) => {
+    const card = event.target.closest?.(".card");
+    if (nameIn(card)) act(event, card);
+  });
+  onCards("dragstart", ({ dataTransfer }, card) => dataTransfer.setData("text/x-flight", nameIn(card)));
+  onCards("dragover", (event, card) => {
+    if (!event.dataTransfer.types.includes("text/x-flight")) return;
+    event.preventDefault();
+    card.classList.add("over");
+  });
+  onCards("dragleave", (_, card) => card.classList.remove("over"));
+  onCards("drop", (event, card) => {
+    const other = event.dataTransfer.getData("text/x-flight");
+    card.classList.remove("over");
+    event.preventDefault();
+    if (other && other !== nameIn(card)) location = `compare?${new URLSearchParams([["flight", other], ["flight", nameIn(card)]])}`;
+  });
+
   document.addEventListener("click", ({ target }) => {
     if (!target.matches?.(".copy")) return;
     const text = document.getElementById(target.dataset.of).textContent;
@@ -35,7 +55,8 @@
   if (form) {
     let timer = 0, latest = 0;
     const named = (key) => all("[data-key]", form).find((field) => field.dataset.key === key);
-    const show = ({ command, python, changed, faults, error }) => {
+    const show = ({ command, python, toml, changed, faults, error }) => {
+      document.querySelector("#toml").textContent = toml || "# no changes";
       document.querySelector("#command").textContent = command;
       document.querySelector("#python").textContent = python;
       const problem = document.querySelector("#problem");

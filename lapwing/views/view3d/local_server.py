@@ -15,7 +15,11 @@ _LOCK = threading.Lock()  # one server starts at a time: the guard is installed 
 
 
 @contextlib.contextmanager
-def run_server(token: str = "", transform: Callable[[str], str] | None = None) -> Iterator[Any]:
+def run_server(
+    token: str = "",
+    transform: Callable[[str], str] | None = None,
+    take_sticks: Callable[[str], bool] = lambda query: False,
+) -> Iterator[Any]:
     """Run a viser server until the end of the context.
 
     viser has no authentication and accepts every origin, so a guard filters the requests.
@@ -23,6 +27,7 @@ def run_server(token: str = "", transform: Callable[[str], str] | None = None) -
     Args:
         token: required first part of the path of a request; "" rejects all requests.
         transform: returns the page to serve from that of viser's client.
+        take_sticks: takes the query of a request for `sticks`; returns False if it is invalid.
     """
     with _LOCK:
         _mute_viser()
@@ -30,7 +35,7 @@ def run_server(token: str = "", transform: Callable[[str], str] | None = None) -
         import websockets.asyncio.server as sockets
 
         logging.getLogger("websockets.server").setLevel(logging.CRITICAL)  # it logs each rejected request
-        guard = Guard(token, transform)
+        guard = Guard(token, transform, take_sticks)
         original = sockets.serve
 
         def add_guard(*arguments: Any, **options: Any) -> Any:
@@ -67,8 +72,8 @@ def _mute_viser() -> None:
 class Guard:
     """Filter of requests before viser's handler: it requires the secret, the host and the origin."""
 
-    def __init__(self, token: str, transform: Callable[[str], str] | None):
-        self._token, self._transform = token, transform
+    def __init__(self, token: str, transform: Callable[[str], str] | None, take_sticks: Callable[[str], bool]):
+        self._token, self._transform, self._take_sticks = token, transform, take_sticks
         self.hosts: set[str] = set()
         self.handler: Any = None
 
@@ -83,6 +88,10 @@ class Guard:
         request.path = "/" + request.path.lstrip("/").partition("/")[2]
         if request.headers.get("Upgrade", "").lower() == "websocket":
             return None
+        name, _, query = request.path.partition("?")
+        if name == "/sticks":
+            accepted = self._take_sticks(query)
+            return connection.respond(http.HTTPStatus.OK if accepted else http.HTTPStatus.BAD_REQUEST, "")
         if "Accept-Encoding" in request.headers:
             del request.headers["Accept-Encoding"]  # the page is transformed as text
         response = self.handler(connection, request)

@@ -20,7 +20,7 @@ from lapwing.views.view3d.surroundings import add_surroundings
 RATE = 30.0  # [1/s] frame rate of a recording
 FRAMES = 2000  # largest number of frames of a recording; the rate of a longer one is lower
 FLEET_FRAMES = 24000  # largest number of frames times vehicles
-SCRIPTS = ("software.js", "bridge.js", "toolbar.js")
+SCRIPTS = ("software.js", "bridge.js", "toolbar.js", "sticks.js")
 POINTS = 1500  # largest number of points of a trail, before those are removed that it can be drawn without
 PLACE, TINT = 0.02, 0.05  # errors of a trail's place and colour, over the size of the vehicle and the colour scale
 
@@ -127,8 +127,8 @@ def with_bridge(html: str, facts: dict[str, Any]) -> str:
     Args:
         html: page of viser's client.
         facts: "names" and "colours" of the vehicles, "size" of the largest [m], "start" [s], largest "error" [m],
-            "live"; for a recording "trails", the times of the points of each trail [s], and "step", the time between
-            two frames [s].
+            "live", and of a live view "sticks", the vehicles that accept commands; for a recording "trails", the times
+            of the points of each trail [s], and "step", the time between two frames [s].
     """
     code = "".join((Path(__file__).parent / name).read_text(encoding="utf-8") for name in SCRIPTS)
     text = json.dumps(facts, separators=(",", ":")).replace("<", "\\u003c")

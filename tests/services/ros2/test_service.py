@@ -1,5 +1,6 @@
 """Run as a node of a ROS 2 graph, observed and commanded by zenoh-ros2-sdk, an independent client."""
 
+import json
 import os
 import queue
 import socket
@@ -10,10 +11,23 @@ import time
 import numpy as np
 import pytest
 
+from lapwing import read_log
 from lapwing.cosim.log import LogReader, LogWriter
 from lapwing.cosim.processes.run_monitor import MONITOR
-from lapwing.messages import Actuators, Bool, Clock, Log, OperatorInput, PoseStamped, String, stamp
+from lapwing.messages import (
+    Actuators,
+    Bool,
+    Clock,
+    Log,
+    OperatorCommand,
+    OperatorInput,
+    PoseStamped,
+    String,
+    header,
+    stamp,
+)
 from lapwing.messages.types import FOLDER
+from lapwing.services.common.operator_inbox import AnsweredInbox
 from lapwing.services.process_table import ROS2, required_processes
 from lapwing.services.ros2.commands import SOURCE
 from lapwing.services.ros2.node import ROUTER, Node, parse_router
@@ -23,7 +37,7 @@ from tests.endpoints import loopback_endpoints
 pytestmark = pytest.mark.long
 
 DOMAIN = 7
-PATIENCE = 120.0  # [s] for the run to compile and start
+PATIENCE = 600.0  # [s] for the run to compile and start on a busy machine
 
 
 @pytest.fixture
@@ -89,8 +103,8 @@ class Graph:
         return ZenohSession.get_instance().store.types[name]
 
 
-def fly(tmp_path, port, *more, scene="groundstation"):
-    words = ["--ros2", str(DOMAIN), "--ros2-router", f"127.0.0.1:{port}", "--log", str(tmp_path / "a.mcap"), *more]
+def fly(tmp_path, port, *more, scene="groundstation", domain=DOMAIN):
+    words = ["--ros2", str(domain), "--ros2-router", f"127.0.0.1:{port}", "--log", str(tmp_path / "a.mcap"), *more]
     command = [sys.executable, "-m", "lapwing", "run", scene, "--set", "success.require=[]", *words]
     run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
     await_listener(run, port)
@@ -188,6 +202,51 @@ def test_node_drives_motors(tmp_path, port, diagram):
     values = [command for message in inputs for command in message.commands if command.kind == "offboard_motors"]
     assert {(command.source, command.values) for command in values} == {(SOURCE, tuple(volts))}
     assert np.all(recorded["motor_voltage"] == volts, axis=1).any()
+
+
+NODE = """
+import runpy, sys
+from zenoh_ros2_sdk import message_registry
+message_registry.get_registry(sys.argv[1])
+sys.argv[1:] = sys.argv[2:]
+runpy.run_path("examples/ros2_node.py")
+"""
+
+
+def test_node_in_lock_step_flies_the_same_at_any_speed(tmp_path, port, diagram):
+    digests = []
+    for delay in (0.0, 0.02):
+        words = ["--set", "ros2.lock_step=true", "--set", "autopilot.estimator=ground_truth"]
+        words += ["--set", "run.duration=6", "--speed", "max", "--json", str(tmp_path / "a.json")]
+        run = fly(tmp_path, port, *words, domain=0)
+        arguments = [tmp_path / "msg", delay, port]
+        node = subprocess.Popen([sys.executable, "-c", NODE, *map(str, arguments)], stdout=subprocess.PIPE, text=True)
+        try:
+            output = run.communicate(timeout=PATIENCE)[0]
+            answers = node.communicate(timeout=PATIENCE)[0]
+        finally:
+            run.kill()
+            node.kill()
+        assert (run.returncode, node.returncode) == (0, 0), output + answers
+        digests.append(json.loads((tmp_path / "a.json").read_text())["digest"])
+    assert digests[0] == digests[1]
+    flight = read_log(tmp_path / "a.mcap")
+    assert flight.truth.position[-1, 2] > 1.0
+    again = [sys.executable, "-m", "lapwing", "resimulate", str(tmp_path / "a.mcap")]
+    done = subprocess.run(again, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_commands_of_a_tick_do_not_depend_on_the_order_of_arrival():
+    def answer(tick, *kinds):
+        commands = tuple(OperatorCommand(kind) for kind in kinds)
+        return tick * 1000, OperatorInput(header(0, "drone1"), commands).encode()
+
+    without_stamp = answer(0, "arm")
+    sent = iter([answer(0, "a"), without_stamp, answer(5), answer(10, "b"), answer(15, "c")])
+    inbox = AnsweredInbox(["drone1"], lambda waiting_for: next(sent), 1000, 5)
+    taken = {tick: [command.kind for command in inbox.take("drone1", tick)] for tick in range(0, 21, 5)}
+    assert taken == {0: [], 5: ["a"], 10: ["arm"], 15: ["b"], 20: ["c"]}
 
 
 @pytest.mark.nightly

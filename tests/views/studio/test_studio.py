@@ -5,6 +5,7 @@ import re
 import socket
 import subprocess
 import sys
+import tomllib
 
 import pytest
 
@@ -130,6 +131,7 @@ def test_preview_names_command_python_and_faults(studio):
     assert answer["command"] == "lapwing run hover --set run.seed=2 --speed 2 --view"
     assert "lapwing.fly('hover', {\n    'run.seed': 2,\n})" in answer["python"]
     assert (answer["changed"], answer["faults"], answer["error"]) == (["run.seed"], {}, "")
+    assert tomllib.loads(answer["toml"]) == {"run": {"seed": 2}}
     answer = json.loads(studio.request("scenes/hover/preview", {"run.duration": "-1"})[1])
     assert answer["faults"] == {"run.duration": "expected a number above 0 and at most 1e+06 [s], got -1.0"}
 

@@ -1,11 +1,13 @@
 """`lapwing studio` in headless Chromium: select a scene, change it, run it, view it, compare flights."""
 
 import time
+import tomllib
 import urllib.error
 import urllib.request
 
 import pytest
 
+from lapwing.cli.new_command import write_scene
 from lapwing.views.view3d import headless as chromium
 
 pytest.importorskip("starlette", reason="needs starlette (pip install lapwing[studio])")
@@ -156,3 +158,54 @@ def test_page_fits_phone(start, tmp_path):
             """
         )
     assert width[0] <= width[1]
+
+
+PLACES = """
+[[environment.terrain.box]]
+position = [4.0, 4.0]
+size = [2.0, 1.0]
+top = 1.5
+[effects.wind_constant]
+velocity = [2.0, 0.0, 0.0]
+"""
+
+
+def test_user_drags_waypoint_building_start_and_wind(start, tmp_path):
+    write_scene("mine", tmp_path)
+    scene = tmp_path / "mine.toml"
+    scene.write_text(scene.read_text() + PLACES)
+    studio = start(tmp_path)
+    with chromium.Browser(f"{studio.address}scenes/mine.toml", (1280, 900)) as browser:
+        user = User(browser)
+        changed = user.do(
+            """
+            const move = (what, dx, dy, more) => {
+              const box = one(what).getBoundingClientRect(), [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
+              const send = (to, kind, x, y) => to.dispatchEvent(
+                new PointerEvent(kind, { clientX: x, clientY: y, pointerId: 1, bubbles: true, ...more }));
+              one("#map").setPointerCapture = () => {};
+              send(one(what), "pointerdown", x, y);
+              send(one("#map"), "pointermove", x + dx, y + dy);
+              send(one("#map"), "pointerup", x + dx, y + dy);
+            };
+            await until(() => one("#map .waypoint"));
+            move("#map .waypoint", 0, -30, { shiftKey: true });
+            for (const what of [".building", ".start", "circle.wind"]) move(`#map ${what}`, 25, 0, {});
+            await until(() => document.querySelectorAll(".field.changed").length === 4);
+            return [one("#toml").textContent, one("#command").textContent, one("#problem").hidden];
+            """
+        )
+        assert browser.errors == []
+    text, command, valid = changed
+    assert valid
+    tables, before = tomllib.loads(text), tomllib.loads(scene.read_text())
+    first, *others = tables["trajectory"]["waypoints"]
+    assert first[:2] == before["trajectory"]["waypoints"][0][:2]
+    assert first[2] > before["trajectory"]["waypoints"][0][2]
+    assert others == before["trajectory"]["waypoints"][1:]
+    (box,) = tables["environment"]["terrain"]["box"]
+    assert {**box, "position": [4.0, 4.0]} == before["environment"]["terrain"]["box"][0]
+    assert box["position"][0] > 4.0
+    assert tables["vehicle"]["initial_position"][0] > 0.0
+    assert tables["effects"]["wind_constant"]["velocity"][1] > 0.0
+    assert "--set 'trajectory.waypoints=" in command
