@@ -84,6 +84,11 @@ class Px4Link(MavlinkLink):
             self._config.interval_ns, self._armed, self._silent, self._answers,
         )  # fmt: skip
 
+    @property
+    def clock_at_start(self) -> float:
+        """Return the firmware's clock [s] at tick 0."""
+        return 1e-6 * float(self._epoch[0])
+
     def close(self) -> None:
         """End the program and close the connections."""
         super().close()
