@@ -81,6 +81,7 @@ class MissionClient:
         self._initial = {**optional, **parameters}, conventions.bytewise, sets, optional.keys() - parameters.keys()
         self._codec = mavlink.MAVLink(None, srcSystem=SYSTEM, srcComponent=COMPONENT)
         self._codec.robust_parsing = True
+        self._others = set[int]()  # ids of messages without a handler
         self.next_poll = self._beat = -1.0  # [s] of the next poll, heartbeat
         self.version = ""
         self._reset()
@@ -89,7 +90,7 @@ class MissionClient:
         """Reset to the state before the first heartbeat."""
         self._parameters = ParameterClient(*self._initial)
         self._target = 0  # system id of the firmware
-        self._others, self._stopped = set[int](), set[int]()  # ids of messages without a handler; of stopped ones
+        self._stopped = set[int]()  # ids of messages that the firmware was asked to stop
         self._sent = -1.0  # [s] of the last request
         self._in_mode = False
         self._rejections = 0
