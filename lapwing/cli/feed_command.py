@@ -37,6 +37,6 @@ def feed(
         estimates.append(found._replace(name=f"build {number}"))
     typer.echo("differences, root mean square and greatest; of the position without the mean")
     for first, second in combinations(estimates, 2):
-        found = study.difference(first, second, skip)
-        parts = [f"{rms:.3g} {unit} (at most {most:.3g})" for unit, rms, most in found]
+        rows = study.difference(first, second, skip)
+        parts = [f"{rms:.3g} {unit} (at most {most:.3g})" for unit, rms, most in rows]
         typer.echo(f"{first.name} and {second.name}: {', '.join(parts)}")

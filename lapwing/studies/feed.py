@@ -28,7 +28,7 @@ EVERY = 20_000.0  # [us] between two estimates
 AHEAD = 0.02  # [s] of the begin after a fix, so that none is late by a period if they jitter
 VARIANCE = (0.25, 0.25, 0.64)  # [m^2] of a fix, which is not imported
 KEPT_TICKS = 64  # [ticks] history of the ports
-SENSORS = {  # name in the recording, and class of the reading
+SENSORS: dict[str, tuple[str, Any]] = {  # name in the recording, and class of the reading
     ports.GPS: ("gps", ports.GpsReading),
     ports.MAGNETOMETER: ("mag", ports.MagnetometerReading),
     ports.BAROMETER: ("baro", ports.BarometerReading),
@@ -235,7 +235,7 @@ def _estimate(link: Any, begin: float, report: str) -> Estimate:
     return Estimate(name, attitude, Series.of(time, position), Series.of(time, velocity), digest.hexdigest(), report)
 
 
-def _at(series: Series, time: float) -> tuple[float, ...]:
+def _at(series: Series, time: float) -> Any:
     return tuple(series.at(np.array([time]))[0].tolist())
 
 
