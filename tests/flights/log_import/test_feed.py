@@ -3,6 +3,7 @@
 import re
 import shlex
 
+import pytest
 from flight_writers import write_bin
 
 from tests.services.firmware_links import lapwing, scripted
@@ -13,10 +14,11 @@ def numbers(line):
     return [float(text) for text in re.findall(r"[\d.]+(?:e[+-]\d+)?(?=[ )])", line.replace("build 1", ""))]
 
 
-def test_estimates_are_compared_with_log_and_with_each_other(flight, tmp_path):
+@pytest.mark.parametrize("firmware", ["px4", pytest.param("ardupilot", marks=pytest.mark.long)])
+def test_estimates_are_compared_with_log_and_with_each_other(firmware, flight, tmp_path):
     write_bin(tmp_path / "f.bin", flight)
-    builds = [f"--command={shlex.join(scripted('px4', '--estimate', bias))}" for bias in (0, 0, 0.5)]
-    done = lapwing("feed", tmp_path / "f.bin", "--firmware", "px4", *builds, "--skip", "0.5")
+    builds = [f"--command={shlex.join(scripted(firmware, '--estimate', bias))}" for bias in (0, 0, 0.5)]
+    done = lapwing("feed", tmp_path / "f.bin", "--firmware", firmware, *builds, "--skip", "0.5")
     lines = done.stdout.splitlines()
     digests = [line.rpartition("digest ")[2] for line in lines[:3]]
     assert digests[0] == digests[1] != digests[2]
