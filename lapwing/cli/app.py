@@ -21,7 +21,7 @@ GROUPS = {  # headings and commands in the order of a workflow
     "Start here": tuple(FIRST),
     "Fly": ("scenes", "test", "service"),
     "Inspect": ("report", "render", "parameters"),
-    "Study": ("performance", "effects", "accuracy", "stability", "compare", "identify"),
+    "Study": ("performance", "effects", "accuracy", "stability", "compare", "identify", "feed"),
     "Logs": ("import", "info", "verify", "recover", "export", "replay", "resimulate"),
     "Couple": ("export-fmu", "export-ssp", "export-library"),
     "Set up": ("precompile", "certificates", "protocol", "schema"),

@@ -12,6 +12,7 @@ import typer
 from lapwing.cli import (  # noqa: F401 (they register themselves)
     campaign_commands,
     export_commands,
+    feed_command,
     flight_commands,
     log_commands,
     log_playback,

@@ -88,6 +88,8 @@ def check_firmware_program(scene: "Scene") -> None:
         folder = Path(keys.directory or ".")
         if not folder.is_dir():
             raise ConfigError(f"{TABLE}.directory", f"no folder {folder}", "the working directory of the program")
+        if keys.shell and not keys.command:
+            raise ConfigError(f"{TABLE}.shell", "Lapwing does not start the firmware", f"{TABLE}.command, its program")
         if keys.command and not _is_program(folder, keys.command[0]):
             expected = "path of a program, or a name on the PATH"
             raise ConfigError(f"{TABLE}.command", f"cannot start {keys.command[0]}", expected)

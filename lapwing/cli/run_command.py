@@ -65,6 +65,8 @@ def _prepare(options: RunOptions) -> "tuple[Scene, RunOptions, ProcessSpec]":
         scene = _load(options)
         options = _with_ros2_of_scene(options, scene)
         options = replace(options, mode=options.mode_of(any(map(flown_by_firmware, scene.each_vehicle))))
+        if options.shell and options.mode != SINGLE_PROCESS:
+            raise ValueError(f"--shell: needs --mode {SINGLE_PROCESS}; leave out options that need processes")
         if not options.external:
             check_firmware_program(scene)
         check_gains(scene, options.force)
@@ -99,6 +101,8 @@ def _load(options: RunOptions) -> "Scene":
     overrides = list(options.set_ or [])
     if options.firmware_schedule is not None:
         overrides.append(f"autopilot.schedule={options.firmware_schedule}")
+    if options.shell:
+        overrides.append("autopilot.shell=true")
     if options.plan:
         overrides += run_options.plan_overrides(options.plan, options.scene, overrides)
     elif options.mavlink:

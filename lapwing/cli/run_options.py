@@ -102,6 +102,9 @@ class RunOptions(LinkOptions):
     firmware_schedule: Annotated[
         int | None, typer.Option(metavar="SEED", help="order of the firmware's threads [autopilot.schedule]")
     ] = None
+    shell: Annotated[
+        bool, typer.Option("--shell", help="connect the firmware's console, in one process; see also --speed")
+    ] = False
     force: Annotated[bool, typer.Option("--force", help="fly even if the gains make a loop unstable in hover")] = False
     allow_code: Annotated[bool, typer.Option("--allow-code", help="allow FMUs of the scene to run")] = False
 

@@ -42,6 +42,7 @@ class ArduPilotExchange(NamedTuple):
     samples: Samples
     channel: Channel
     next_count: Any  # (1,) frame count of the next servo packet
+    pulses: tuple[float, float]  # [us] of motors at rest and at full throttle
 
 
 @always_inline
@@ -115,7 +116,7 @@ def exchange(p: ArduPilotExchange, tick: int) -> int:
     if _is_expected(p, size):
         p.next_count[0] += 1
         for k in range(OUTPUTS):
-            e.outputs[k] = throttle(_unsigned16(c.received, _HEAD + 2 * k))
+            e.outputs[k] = throttle(_unsigned16(c.received, _HEAD + 2 * k), p.pulses[0], p.pulses[1])
     elif not call_python(e, tick, WAIT, size):
         return FAILED
     running = 0

@@ -22,6 +22,7 @@ from lapwing.services.ardupilot.servo_packet import (
     ServoPacket,
     decode,
     frames_ahead,
+    pulse_range,
     throttle,
 )
 from lapwing.services.common import ports
@@ -31,6 +32,7 @@ from lapwing.services.common.firmware.link import Read
 from lapwing.services.common.firmware.mavlink_link import MavlinkLink
 from lapwing.services.common.firmware.mavlink_transport import TcpTransport
 from lapwing.services.common.firmware.mission_client import MissionClient
+from lapwing.services.common.firmware.parameter_client import parameters_in
 from lapwing.services.common.firmware.program import TCP, UDP, OwnPort
 from lapwing.services.common.firmware.repeatable import Turns
 from lapwing.services.common.firmware.service import firmware_service
@@ -80,6 +82,7 @@ class ArduPilotLink(MavlinkLink):
     def __init__(self, config: FirmwareConfig) -> None:
         """Store the configuration."""
         super().__init__(config)
+        self._pulses = pulse_range(parameters_in(config.parameter_text) | config.parameters)
         self._next = np.full(1, ANY)  # count of the next frame; compiled code increments it for each frame in order
 
     @property
@@ -101,7 +104,7 @@ class ArduPilotLink(MavlinkLink):
             bool(own.range_port),
             own.airspeed,
         )
-        return ArduPilotExchange(shared, samples, self._socket.memory, self._next)
+        return ArduPilotExchange(shared, samples, self._socket.memory, self._next, self._pulses)
 
     def close(self) -> None:
         """End the program and close the connections."""
@@ -167,7 +170,7 @@ class ArduPilotLink(MavlinkLink):
         self._was_resent, timeout = False, self._config.step_timeout
         for _ in self._attempts("ardupilot", timeout):
             if packet := self._process(size):
-                self._shared.outputs[:] = [throttle(pwm) for pwm in packet.pwm[:OUTPUTS]]
+                self._shared.outputs[:] = [throttle(pwm, *self._pulses) for pwm in packet.pwm[:OUTPUTS]]
                 return
             if size < 0 and self._was_resent:
                 self._was_resent = False

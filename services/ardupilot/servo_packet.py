@@ -6,6 +6,7 @@ answer does not arrive within about a second. Such a frame is answered but does 
 """
 
 import struct
+from collections.abc import Mapping
 from typing import NamedTuple
 
 from lapwing.kernels import always_inline
@@ -14,7 +15,7 @@ MAGIC_16, MAGIC_32 = 18458, 29569
 _HEAD = struct.Struct("<HHI")
 _LAYOUTS = {MAGIC_16: struct.Struct("<HHI16H"), MAGIC_32: struct.Struct("<HHI32H")}
 PULSE_MAX = 3000  # [us] longest plausible pulse; 0: the channel is unused
-PWM_MIN, PWM_MAX = 1000.0, 2000.0  # [us] MOT_PWM_MIN and MOT_PWM_MAX
+PULSE_LOW, PULSE_HIGH = 1000.0, 2000.0  # [us] of motors at rest and at full throttle
 ANY = -1  # expected count before the first frame of a program
 RESENT, RESTARTED = -1, -2  # the last frame again; a lower count: the program has restarted
 
@@ -49,10 +50,15 @@ def decode(data: bytes) -> ServoPacket:
     return ServoPacket(rate, count, pwm)
 
 
+def pulse_range(parameters: Mapping[str, float]) -> tuple[float, float]:
+    """Return the pulses [us] of motors at rest and at full throttle from ArduPilot's parameters."""
+    return parameters.get("MOT_PWM_MIN", 0.0) or PULSE_LOW, parameters.get("MOT_PWM_MAX", 0.0) or PULSE_HIGH
+
+
 @always_inline
-def throttle(pwm: int) -> float:
-    """Return the fraction, 0 to 1, of a pulse width [us]."""
-    return min(max((pwm - PWM_MIN) / (PWM_MAX - PWM_MIN), 0.0), 1.0)
+def throttle(pwm: int, low: float, high: float) -> float:
+    """Return the fraction, 0 to 1, of a pulse width [us] in the range of a motor; 0 of an unused channel."""
+    return min(max((pwm - low) / (high - low), 0.0), 1.0)
 
 
 def frames_ahead(count: int, expected: int) -> int:

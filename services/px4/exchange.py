@@ -11,7 +11,7 @@ from lapwing.services.px4.sensor_frame import NONE, Frame, Sensors, read_control
 
 __all__ = ["step"]
 OUTPUTS = 4
-MESSAGES = 100  # reason to call Python: append the messages of `messages.RARE`
+MESSAGES = 100  # reason to call Python: append the messages of `rare_messages`
 _IMU, _MAGNETOMETER, _BAROMETER, _AIRSPEED = range(4)
 
 
@@ -22,7 +22,7 @@ class Readings(NamedTuple):
     magnetometer: InputRing
     barometer: InputRing
     airspeed: InputRing
-    periods: Any  # (n,) int64 [ticks] period of these ports, then of those in `messages.RARE`; 0: none
+    periods: Any  # (n,) int64 [ticks] period of these ports, then of those in `rare_messages`; 0: none
     step: int  # [ticks] between two exchanges
 
 

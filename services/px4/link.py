@@ -30,7 +30,7 @@ from lapwing.services.common.firmware.service import firmware_service
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.ports import AirspeedReading
 from lapwing.services.px4.exchange import MESSAGES, OUTPUTS, Px4Exchange, Readings, is_new
-from lapwing.services.px4.messages import ARMED, LOCK_STEP, RARE
+from lapwing.services.px4.messages import ARMED, LOCK_STEP, rare_messages
 from lapwing.services.px4.modes import CONVENTIONS
 from lapwing.services.px4.resolve import NAME, Px4Config
 from lapwing.services.px4.sensor_frame import COMPONENT, NONE, SYSTEM, Sensors, frame, sensor_frame
@@ -59,6 +59,7 @@ class Px4Link(MavlinkLink):
     def __init__(self, config: FirmwareConfig) -> None:
         """Store the configuration."""
         super().__init__(config)
+        self._rare = rare_messages(config.own.datum.home)
         self._sequence, self._rest, self._epoch, self._armed, self._silent, self._answers = np.zeros((6, 1), np.int64)
         self._port = 0  # of the firmware's end, 0 without a connection
         self._last_us = 0  # [us] of the last message
@@ -68,7 +69,7 @@ class Px4Link(MavlinkLink):
     def exchange(self, shared: Shared, ring: Callable[[str], InputRing]) -> Px4Exchange:
         """Return the parameters of the compiled exchange."""
         self._shared, periods, channel = shared, self._own.periods, self._socket.memory
-        port_names = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.AIRSPEED, *RARE)
+        port_names = (ports.IMU, ports.MAGNETOMETER, ports.BAROMETER, ports.AIRSPEED, *self._rare)
         airspeed = ring(ports.AIRSPEED) if ports.AIRSPEED in periods else empty_ring(AirspeedReading())
         readings = Readings(
             ring(ports.IMU),
@@ -82,6 +83,11 @@ class Px4Link(MavlinkLink):
             shared, readings, channel, frame(channel.sent), frame(), self._sequence, self._rest, self._epoch,
             self._config.interval_ns, self._armed, self._silent, self._answers,
         )  # fmt: skip
+
+    @property
+    def clock_at_start(self) -> float:
+        """Return the firmware's clock [s] at tick 0."""
+        return 1e-6 * float(self._epoch[0])
 
     def close(self) -> None:
         """End the program and close the connections."""
@@ -183,7 +189,7 @@ class Px4Link(MavlinkLink):
     def _handle(self, tick: int, reason: int, number: int, read: Read) -> None:
         self._last_us = int(self._epoch[0]) + tick * self._config.interval_ns // 1000
         if reason == MESSAGES:
-            for port, message_of in RARE.items():
+            for port, message_of in self._rare.items():
                 if python_function(is_new)(self._own.periods.get(port, 0), self._config.period, tick) and (
                     message := message_of(self._last_us, read(port))
                 ):

@@ -31,6 +31,7 @@ DELAYS = {  # parameters [ms] of the delay of each sensor; of GPS also the name 
 }
 DELAY_MAX = 200.0  # [ms] EKF2_DELAY_MAX of PX4, which no delay may exceed
 IMU_RATES = (100, 200, 250, 400)  # [Hz] values of IMU_INTEG_RATE
+TRUTH_PERIOD = 10  # steps between two messages of the true state, which only PX4's log uses
 OPTIONAL = (ports.AIRSPEED, ports.RANGEFINDER, ports.SONAR)
 _rotate_back = python_function(quaternion.rotate_back)
 _pressure = python_function(atmosphere.pressure)
@@ -62,6 +63,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         raise ConfigError("autopilot.firmware", f'"px4" needs {missing}; add them or choose another firmware')
     sensors = [*REQUIRED, *(name for name in OPTIONAL if name in tables)]
     periods = {name: ticks(scene, scene.lookup(f"sensors.{name}.rate"), name) for name in sensors}
+    periods[ports.TRUTH] = TRUTH_PERIOD * periods[ports.IMU]
     here, (position, attitude) = environment(scene), start_pose(scene)
     own = Px4Config(
         Datum(here.home, start_height(scene), start_height(scene)),
@@ -71,7 +73,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         _pressure(here.atmosphere, here.home.height + _height_above_home(here.home, position)),
         sensor_parameters(scene),
     )
-    return with_mission(scene, Px4, firmware_config(scene, tuple(sensors), periods[ports.IMU], own))
+    return with_mission(scene, Px4, firmware_config(scene, tuple(periods), periods[ports.IMU], own))
 
 
 def sensor_parameters(scene: Scene) -> dict[str, float]:

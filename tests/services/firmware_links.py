@@ -73,7 +73,7 @@ def link_with(kind, own, samples):
 def firmware_setup(firmware, own, instance, **changes):
     """Return the configuration of a link with steps of 4 ms that waits for a peer."""
     config = FirmwareConfig(
-        firmware, [], None, {}, HOST, None, instance, 20.0, 5.0, True, 0, {}, "", False, (0, 2, 1, 3), 11.1,
+        firmware, [], None, {}, HOST, None, instance, 20.0, 5.0, True, 0, False, {}, "", False, (0, 2, 1, 3), 11.1,
         (0.0, 0.0, 0.11), 0.004, 4_000_000, 1, 25, (), (), own,
     )  # fmt: skip
     return config._replace(**changes)

@@ -15,10 +15,11 @@ from typing import Any
 import numpy as np
 
 from lapwing.flights.log_import.channels import Channels, to_recording
-from lapwing.flights.log_import.log_conventions import FIX, PULSE_HIGH, PULSE_LOW, direction, parsing, shares
+from lapwing.flights.log_import.log_conventions import FIX, direction, parsing, shares
 from lapwing.flights.log_import.message_columns import Columns, MessageColumns
 from lapwing.flights.log_import.recording import ELLIPSOID, SEA_LEVEL, Recording, Series, session_notes
 from lapwing.flights.log_import.source_choice import Choices
+from lapwing.services.ardupilot.servo_packet import pulse_range
 
 FIRST_MOTOR, NINTH_MOTOR = 33, 82  # SERVOn_FUNCTION of motors 1 to 8, and 9 to 12
 OUTPUTS = 32  # highest number of an output
@@ -261,11 +262,6 @@ def motor_outputs(parameters: dict[str, float]) -> list[int]:
         elif NINTH_MOTOR <= function < NINTH_MOTOR + 4:
             outputs[8 + function - NINTH_MOTOR] = n
     return [outputs[k] for k in sorted(outputs)]
-
-
-def pulse_range(parameters: dict[str, float]) -> tuple[float, float]:
-    """Return the pulses [us] of motors at rest and at full throttle from ArduPilot's parameters."""
-    return parameters.get("MOT_PWM_MIN", 0.0) or PULSE_LOW, parameters.get("MOT_PWM_MAX", 0.0) or PULSE_HIGH
 
 
 def _duty(path: Path, messages: dict[str, Columns], parameters: dict[str, float], channels: Channels) -> Series | None:

@@ -13,11 +13,12 @@ import numpy as np
 
 from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.flights.log_import.channels import Channels, to_recording
-from lapwing.flights.log_import.dataflash_flight import lacks, motor_outputs, pulse_range
+from lapwing.flights.log_import.dataflash_flight import lacks, motor_outputs
 from lapwing.flights.log_import.log_conventions import FIX, LogError, direction, out_of_range, parsing, shares
 from lapwing.flights.log_import.message_columns import Columns, MessageColumns
 from lapwing.flights.log_import.recording import ELLIPSOID, RESTART, SEA_LEVEL, Recording, Series, session_notes
 from lapwing.flights.log_import.source_choice import Choices
+from lapwing.services.ardupilot.servo_packet import pulse_range
 
 HIGHEST_SHARE = 2.0  # values of ACTUATOR_OUTPUT_STATUS above are pulses [us]
 NO_AUTOPILOT = 8  # MAV_AUTOPILOT_INVALID

@@ -4,7 +4,7 @@ from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.scene import Scene
 from lapwing.messages.topics import ACTUATORS, ESTIMATE, ESTIMATE_COVARIANCE, SETPOINT, STATUS, TRUTH
 from lapwing.services.autopilot.schema import Autopilot
-from lapwing.services.common.firmware.schema import TABLE, firmware_of, flown_by_firmware
+from lapwing.services.common.firmware.schema import flown_by_firmware, require_program
 from lapwing.services.common.schemas.communication_schema import Communication, Rates
 from lapwing.services.common.schemas.run_schema import follows_trajectory
 from lapwing.services.scene_resolver import resolve
@@ -29,6 +29,4 @@ def campaign_config(scene: Scene) -> RunConfig:
 def _check(scene: Scene) -> None:
     if not scene.has(Autopilot) or not (follows_trajectory(scene) or flown_by_firmware(scene)):
         raise ValueError(f"{scene.path}: expected a scene whose autopilot follows a [trajectory]")
-    if flown_by_firmware(scene) and not scene.section(TABLE).command:
-        fault = f"each flight starts {firmware_of(scene)}; expected the program and its arguments, a list of texts"
-        raise ValueError(f"{scene.path}: {TABLE}.command: {fault}")
+    require_program(scene)

@@ -11,7 +11,7 @@ from lapwing.dynamics import effects
 from lapwing.dynamics.effects._vehicle_interaction import INTERACTION
 from lapwing.flights.flight_data import FlightData
 from lapwing.services.autopilot.schema import Autopilot
-from lapwing.services.common.firmware.schema import require_own_autopilot
+from lapwing.services.common.firmware.schema import TABLE, flown_by_firmware, require_program
 from lapwing.services.common.schemas.vehicle_schema import Vehicle
 from lapwing.studies.effects.cost import costs
 from lapwing.studies.effects.variants import (
@@ -116,14 +116,18 @@ def study(
         only: names of the effects to remove or add; None for all.
 
     Raises:
-        ValueError: a vehicle's model has no effects, a foreign firmware flies one, `only` has an unknown effect, or the
-            flight of the scene fails.
+        ValueError: a vehicle's model has no effects, a foreign firmware that flies one has no program or is not
+            repeatable, `only` has an unknown effect, or the flight of the scene fails.
     """
     vehicles = scene.each_vehicle
     for vehicle in vehicles:
         if not vehicle.has(Autopilot):
             raise ValueError(f"{scene.path}: the model {vehicle[Vehicle].model} has no effects; expected a multirotor")
-        require_own_autopilot(vehicle, "flights of {firmware} are not repeatable")
+        require_program(vehicle)
+        if flown_by_firmware(vehicle) and not vehicle.section(TABLE).repeatable:
+            raise ValueError(
+                f"{scene.path}: {TABLE}.repeatable = false: flights differ also without a change; expected true"
+            )
     tables = tables_of(scene)
     present = names_of(tables)
     names = sorted({*effects.names(), *present} if only is None else set(only))

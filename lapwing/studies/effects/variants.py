@@ -14,6 +14,7 @@ from lapwing.dynamics import effects
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.flights.flight_data import FlightData
 from lapwing.messages.topics import TRUTH
+from lapwing.services.common.firmware.schema import firmware_of
 from lapwing.services.common.schemas.vehicle_schema import Effects
 from lapwing.services.scene_resolver import resolve
 from lapwing.studies.simulate import fly_each
@@ -112,5 +113,6 @@ class VariantPool:
 @contextmanager
 def variant_pool(scene: Scene) -> Iterator[VariantPool]:
     """Yield a pool whose processes end with the block, immediately after an error, and with this process."""
-    with workers(os.cpu_count() or 1) as pool:
+    fixed_ports = any(firmware_of(vehicle) == "betaflight" for vehicle in scene.each_vehicle)
+    with workers(1 if fixed_ports else os.cpu_count() or 1) as pool:
         yield VariantPool(scene, pool)

@@ -14,7 +14,7 @@ from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.autopilot.margins import LOOP_WORDS, Margins, margins, open_loops
 from lapwing.services.autopilot.nominal_airframe import known_airframe
 from lapwing.services.autopilot.schema import Autopilot
-from lapwing.services.common.firmware.schema import require_own_autopilot
+from lapwing.services.common.firmware.schema import OWN, firmware_of, flown_by_firmware
 from lapwing.services.common.schemas.communication_schema import Communication
 from lapwing.services.common.schemas.run_schema import follows_trajectory
 from lapwing.services.common.schemas.vehicle_schema import Vehicle
@@ -84,7 +84,8 @@ def tune(
     """
     if not scene.has(Autopilot):
         raise ValueError(f"{scene.path}: has no [autopilot] to tune; use a scene with an autopilot")
-    require_own_autopilot(scene, "{firmware} has its own gains")
+    if flown_by_firmware(scene):
+        raise ValueError(f'{scene.path}: {firmware_of(scene)} has its own gains; expected autopilot.firmware = "{OWN}"')
     for name, value in initial._asdict().items():
         if not 0.0 < value < float("inf"):
             raise ValueError(f"--{name} {value:g}: expected a bandwidth above 0 rad/s")

@@ -29,6 +29,7 @@ class FirmwareConfig(NamedTuple):
     step_timeout: float  # [s]
     repeatable: bool  # the library `repeatable.c` orders the program's threads
     schedule: int  # seed of this order
+    shell: bool  # the program has the standard input and output of this process
     parameters: dict[str, float]  # firmware parameters by name
     parameter_text: str  # content of the parameter file
     chooses: bool  # another instance is used if the ports of this one are in use

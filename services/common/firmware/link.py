@@ -19,7 +19,7 @@ from lapwing.services.common.firmware.program import (
     bound_socket,
     owner_of_port,
 )
-from lapwing.services.common.firmware.repeatable import ELSEWHERE, OFF, Repeatable, Turns, library
+from lapwing.services.common.firmware.repeatable import ELSEWHERE, OFF, SHELL, Repeatable, Turns, library
 
 LOADED = 5.0  # [s] from the start to the library's report
 STARTS = 5  # most starts of a program whose ports are in use
@@ -171,11 +171,11 @@ class ProgramLink:
     def _prepare(self, turns: Turns) -> Repeatable | None:
         """Return the library that makes the program repeatable, None if there is none, for a reason that is stored."""
         try:
-            path = library() if self._config.repeatable else None
+            path = library() if self._config.repeatable and not self._config.shell else None
         except OSError as error:
             self._reason = str(error)
             return None
-        self._reason = "" if path else OFF
+        self._reason = "" if path else SHELL if self._config.shell else OFF
         return Repeatable(path, turns, self._config.schedule) if path else None
 
     def _take_turns(self, event: str) -> None:

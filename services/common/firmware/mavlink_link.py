@@ -21,6 +21,7 @@ class MavlinkLink(ProgramLink):
     """
 
     CONVENTIONS: Conventions
+    CLIENT = MissionClient
 
     _run: Callable[[dict[str, float]], None]  # start the program with parameters
     _connect: Callable[[], None]  # wait for the firmware
@@ -34,6 +35,16 @@ class MavlinkLink(ProgramLink):
         """Store the configuration."""
         super().__init__(config)
         self._own, self._socket = config.own, SharedSocket()
+
+    @property
+    def client(self) -> MissionClient:
+        """Client of the firmware's MAVLink link."""
+        return self._client
+
+    @property
+    def clock_at_start(self) -> float:
+        """Return the firmware's clock [s] at tick 0."""
+        return self._config.interval
 
     def handle_call(self, tick: int, reason: int, number: int, read: Read) -> FirmwareOutput | None:
         """Handle a call from compiled code at `tick`: wait for outputs, send again, or poll the MAVLink link.
@@ -72,8 +83,8 @@ class MavlinkLink(ProgramLink):
         assert self._transport is not None
         if config.command:
             self._run({**conventions.parameters, **described, **chosen})
-            self._client = MissionClient(self._transport, conventions, messages, chosen, sets=False)
+            self._client = self.CLIENT(self._transport, conventions, messages, chosen, sets=False)
         else:
             required = {**(conventions.parameters if items else {}), **chosen}
-            self._client = MissionClient(self._transport, conventions, messages, required, optional=described)
+            self._client = self.CLIENT(self._transport, conventions, messages, required, optional=described)
         self._connect()

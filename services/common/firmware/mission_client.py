@@ -10,13 +10,12 @@ from enum import Enum
 from types import MappingProxyType
 from typing import Any, NamedTuple
 
-from lapwing.services.common.firmware.frame_filter import FrameFilter
 from lapwing.services.common.firmware.link import FirmwareOutput, LinkReport
 from lapwing.services.common.firmware.mavlink_transport import Transport
 from lapwing.services.common.firmware.parameter_client import RETRY, ParameterClient
 from lapwing.services.common.firmware.program import FirmwareError
 from lapwing.services.common.firmware.status_texts import StatusTexts
-from lapwing.services.common.mavlink.dialect import id_of, mavlink
+from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.mavlink.frames import saturate
 
 SYSTEM, COMPONENT = 245, mavlink.MAV_COMP_ID_MISSIONPLANNER  # ids of this client
@@ -25,6 +24,7 @@ ROUND_OFF = 1e-6  # [s] by which a poll may be early
 STATE_EVERY = 200_000.0  # [us] between two EXTENDED_SYS_STATE
 REJECTIONS = 20  # rejected uploads, one per second, after which the flight fails
 CELLS_UNKNOWN, TEMPERATURE_UNKNOWN = 65535, 32767  # in BATTERY_STATUS
+BAD_DATA = -1  # id of the decoder for bytes that are no message
 STOPS = 4  # most messages that one poll asks the firmware to stop
 
 
@@ -81,7 +81,7 @@ class MissionClient:
         self._initial = {**optional, **parameters}, conventions.bytewise, sets, optional.keys() - parameters.keys()
         self._codec = mavlink.MAVLink(None, srcSystem=SYSTEM, srcComponent=COMPONENT)
         self._codec.robust_parsing = True
-        self._filter = FrameFilter(NEEDED)
+        self._others = set[int]()  # ids of messages without a handler
         self.next_poll = self._beat = -1.0  # [s] of the next poll, heartbeat
         self.version = ""
         self._reset()
@@ -135,9 +135,11 @@ class MissionClient:
 
     def read(self) -> None:
         """Connect if there is no connection, and process the received messages."""
-        for message in self._codec.parse_buffer(self._filter.select(self._transport.receive())) or ():
+        for message in self._codec.parse_buffer(self._transport.receive()) or ():
             handler = getattr(self, f"_on_{message.get_type().lower()}", None)
-            if handler is not None and message.get_srcComponent() == mavlink.MAV_COMP_ID_AUTOPILOT1:
+            if handler is None:
+                self._others.add(message.get_msgId())
+            elif message.get_srcComponent() == mavlink.MAV_COMP_ID_AUTOPILOT1:
                 handler(message)
 
     def _stop_others(self) -> None:
@@ -147,7 +149,7 @@ class MissionClient:
         them took a tenth of the CPU time of PX4 and a third of that of Lapwing.
         """
         if self.connected:
-            for number in sorted(self._filter.dropped - self._stopped)[:STOPS]:
+            for number in sorted(self._others - self._stopped - {BAD_DATA})[:STOPS]:
                 self._stopped.add(number)
                 self._command(mavlink.MAV_CMD_SET_MESSAGE_INTERVAL, number, -1.0)
 
@@ -271,10 +273,6 @@ class MissionClient:
     def _on_statustext(self, message: Any) -> None:
         text = message.text.rstrip("\0").strip()  # PX4 ends texts that it also sends as events with a tab
         self.texts.add(text, message.severity, self.armed, self.stage is Stage.ARMING)
-
-
-NEEDED = {number for name in vars(MissionClient) if (number := id_of(name.removeprefix("_on_").upper())) is not None}
-"""Messages with a handler `_on_MESSAGE`."""
 
 
 def poll_flight(report: LinkReport, client: MissionClient, time: float) -> FirmwareOutput:

@@ -9,11 +9,12 @@ import socket
 import subprocess
 import sys
 import tempfile
+import threading
 import time
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from pathlib import Path
-from typing import NamedTuple
+from typing import IO, NamedTuple
 
 from lapwing.cosim.processes.patience import process_state
 from lapwing.cosim.processes.shared_core import process_tree, total_cpu_time
@@ -115,6 +116,7 @@ class Program:
                 (self.directory / name).write_text(content)
             self._file = self.output.open("wb", buffering=0)
             self._command, self._environment = [*config.command, *arguments], config.environment
+            self._shell = config.shell
             self._launch(repeatable)
         except OSError as error:
             self._discard()
@@ -129,12 +131,15 @@ class Program:
             cwd=self.directory,
             env={**os.environ, **self._environment, **(repeatable.environment if repeatable else {})},
             pass_fds=(repeatable.child.fileno(),) if repeatable else (),
-            stdin=subprocess.DEVNULL,
-            stdout=self._file,
+            stdin=None if self._shell else subprocess.DEVNULL,
+            stdout=subprocess.PIPE if self._shell else self._file,
             stderr=subprocess.STDOUT,
             start_new_session=True,
             preexec_fn=_end_with_parent if sys.platform == "linux" else None,
         )
+        if self._process.stdout:
+            self._copying = threading.Thread(target=_copy, args=(self._process.stdout, self._file), daemon=True)
+            self._copying.start()
 
     @property
     def pid(self) -> int:
@@ -206,9 +211,20 @@ class Program:
             os.killpg(self.pid, number)
 
     def _discard(self) -> None:
+        if hasattr(self, "_copying"):
+            self._copying.join(GRACE)
         if hasattr(self, "_file"):
             self._file.close()
         self._remover.communicate()
+
+
+def _copy(output: IO[bytes], file: IO[bytes]) -> None:
+    """Write the output of the program to a file and to the standard output."""
+    with suppress(ValueError):  # the file is closed: a process that has survived the program still writes
+        while data := os.read(output.fileno(), 4096):
+            file.write(data)
+            sys.stdout.buffer.write(data)
+            sys.stdout.flush()
 
 
 def _wait_until(condition: Callable[[], bool]) -> None:

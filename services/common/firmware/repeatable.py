@@ -18,7 +18,7 @@ SOURCE = Path(__file__).with_suffix(".c")
 OPTIONS = ("-O2", "-shared", "-fPIC", "-pthread", "-w")
 NO_COMPILER = "no C compiler; install gcc, or pip install ziglang"
 ELSEWHERE = "Lapwing did not start it"
-OFF = "autopilot.repeatable = false"
+OFF, SHELL = "autopilot.repeatable = false", "its shell is connected"
 NOT_LOADED = "the program does not load a library, as a static one or a script that starts another process"
 NOT_LINKED = "its connection is not made by calls of the C library that are known here"
 

@@ -27,6 +27,7 @@ class FirmwareKeys(SceneTable):
     step_timeout: float = Field(default=10.0, gt=0.0)  # [s] of silence in flight, without time it had no CPU
     repeatable: bool = True  # two flights are equal: the threads of a program that Lapwing starts run in turns
     schedule: int = Field(default=0, ge=0, lt=1 << 63)  # seed of the order of its threads; 0: in turn
+    shell: bool = False  # standard input and output of the command are also those of the program
     parameter_text: str = ""  # content of the file that `parameters` names
 
     @classmethod
@@ -38,7 +39,7 @@ class FirmwareKeys(SceneTable):
 
     def check_own(self) -> None:
         """Raise ConfigError if a key of another firmware is set for Lapwing's own autopilot."""
-        for key in ("command", "directory", "environment", "port", "instance", "parameter_text"):
+        for key in ("command", "directory", "environment", "port", "instance", "shell", "parameter_text"):
             if getattr(self, key):
                 raise ConfigError(f"{TABLE}.{key}", "is not used", f"{TABLE}.firmware = one of {', '.join(FIRMWARES)}")
 
@@ -58,8 +59,8 @@ def flown_by_firmware(scene: Scene) -> bool:
     return firmware_of(scene) in FIRMWARES
 
 
-def require_own_autopilot(scene: Scene, fault: str) -> None:
-    """Raise ValueError if a foreign firmware flies the vehicle; `fault` says why not, with {firmware} for its name."""
-    if flown_by_firmware(scene):
-        fault = fault.format(firmware=firmware_of(scene))
-        raise ValueError(f'{scene.path}: {fault}; expected autopilot.firmware = "{OWN}"')
+def require_program(scene: Scene) -> None:
+    """Raise ValueError if a foreign firmware flies the vehicle and a study of many flights cannot start its program."""
+    if flown_by_firmware(scene) and not scene.section(TABLE).command:
+        fault = f"each flight starts {firmware_of(scene)}; expected the program and its arguments, a list of texts"
+        raise ValueError(f"{scene.path}: {TABLE}.command: {fault}")

@@ -3,7 +3,8 @@
 Started as `python scripted_ardupilot.py --instance N ...`. It opens its first MAVLink port as ArduPilot does, and ends
 if it cannot. With `--die` it exits in flight, with `--stop` it is stopped there for 3 s. With `--slow-exit S` it keeps
 its port for S seconds after SIGTERM. With `--starts FILE` it appends its instance and process id to a file. It writes a
-dataflash log as text, `logs/00000001.BIN`.
+dataflash log as text, `logs/00000001.BIN`. With `--estimate BIAS` it sends the state as its estimate by MAVLink, with a
+bias of the velocity north [m/s].
 """
 
 import argparse
@@ -15,6 +16,8 @@ import time
 from pathlib import Path
 
 sys.path.insert(0, str(Path(__file__).parents[3]))
+
+from pymavlink.dialects.v20 import all as mavlink
 
 from tests.services.ardupilot.peer import ArduPilotPeer
 from tests.services.stopped import stop_for
@@ -45,6 +48,16 @@ def log_lines(state, duty):
     return [", ".join(map(str, (name, us, *values))) for name, values in fields.items()]
 
 
+def estimate(state, bias):
+    """Return a heartbeat and the estimate."""
+    ms, (vx, vy, vz) = round(1e3 * state["timestamp"][0]), state["velocity"]
+    return [
+        mavlink.MAVLink_heartbeat_message(2, 3, 1, 0, 4, 3),
+        mavlink.MAVLink_attitude_quaternion_message(ms, *state["quaternion"], *state["gyro"]),
+        mavlink.MAVLink_local_position_ned_message(ms, *state["position"], vx + bias, vy, vz),
+    ]
+
+
 def main():
     """Run the flight."""
     parser = argparse.ArgumentParser()
@@ -53,6 +66,7 @@ def main():
     parser.add_argument("--stop", action="store_true")
     parser.add_argument("--slow-exit", type=float, default=0.0)
     parser.add_argument("--starts", type=Path)
+    parser.add_argument("--estimate", type=float)
     options, _ = parser.parse_known_args()
     if options.starts:
         with options.starts.open("a") as file:
@@ -73,6 +87,9 @@ def main():
     log.writelines(f"{line}\n" for line in FORMATS)
     peer, duty, ground = ArduPilotPeer(9002 + 10 * options.instance), 0.0, None
     with server:
+        client, codec = None, mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
+        if options.estimate is not None:
+            client, _ = server.accept()
         while True:
             state = peer.exchange((1000 + round(1000 * duty),) * 4 + (0,) * 12)
             ground = -state["position"][2] if ground is None else ground
@@ -81,6 +98,8 @@ def main():
             duty = min(max(HOVER + 0.1 * (target - height) - 0.08 * rate, 0.0), 1.0) if 0.0 < elapsed < 12.0 else 0.0
             if peer.count % 10 == 0:
                 log.writelines(f"{line}\n" for line in log_lines(state, duty))
+            if client and peer.count % 20 == 0:
+                client.sendall(b"".join(message.pack(codec) for message in estimate(state, options.estimate)))
             if options.stop and elapsed > 2.0:
                 options.stop = False
                 stop_for(3.0)

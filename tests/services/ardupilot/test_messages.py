@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from lapwing.kernels import kernel
-from lapwing.services.ardupilot.servo_packet import ANY, RESENT, RESTARTED, decode, frames_ahead, throttle
+from lapwing.services.ardupilot.servo_packet import ANY, RESENT, RESTARTED, decode, frames_ahead, pulse_range, throttle
 from lapwing.services.ardupilot.state_message import INVALID, Extras, VehicleState, write_state
 
 pytestmark = pytest.mark.usefixtures("uncompiled")
@@ -77,7 +77,9 @@ def test_malformed_servo_packet_is_rejected(data, message):
 
 
 def test_throttle_is_limited():
-    assert [throttle(pwm) for pwm in (0, 1000, 1250, 2000, 2100)] == [0.0, 0.0, 0.25, 1.0, 1.0]
+    assert [throttle(pwm, *pulse_range({})) for pwm in (0, 1000, 1250, 2000, 2100)] == [0.0, 0.0, 0.25, 1.0, 1.0]
+    narrow = pulse_range({"MOT_PWM_MIN": 1100.0, "MOT_PWM_MAX": 1900.0})
+    assert [throttle(pwm, *narrow) for pwm in (0, 1000, 1100, 1300, 1900)] == [0.0, 0.0, 0.0, 0.25, 1.0]
 
 
 @pytest.mark.parametrize(

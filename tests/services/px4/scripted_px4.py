@@ -2,10 +2,12 @@
 
 Started as `python scripted_px4.py -i INSTANCE`. With `--stall` it stops answering in flight; with `--stop` it is halted
 there for 3 s. With `--starts FILE` it appends its instance and process id to a file. With `--cores FILE` it writes, in
-flight, the cores of its thread and of each thread of its parent process.
+flight, the cores of its thread and of each thread of its parent process. With `--estimate BIAS` it sends the true state
+as its estimate, with a bias of the velocity north [m/s].
 """
 
 import argparse
+import math
 import os
 import socket
 import sys
@@ -32,6 +34,18 @@ class VehicleSide:
         self.codec = mavlink.MAVLink(None, srcSystem=1 + instance, srcComponent=1)
         self.armed, self.count, self.items = False, 0, {}
         self.mode = 0
+        self.origin = None
+
+    def estimate(self, truth, bias):
+        """Send a HIL_STATE_QUATERNION as the estimate."""
+        ms, (vx, vy, vz) = truth.time_usec // 1000, (0.01 * v for v in (truth.vx, truth.vy, truth.vz))
+        self.origin = self.origin or (truth.lat, truth.lon, truth.alt)
+        north = 1e-7 * (truth.lat - self.origin[0]) * 111.19e3
+        east = 1e-7 * (truth.lon - self.origin[1]) * 111.32e3 * math.cos(math.radians(1e-7 * truth.lat))
+        down = 1e-3 * (self.origin[2] - truth.alt)
+        rates = truth.rollspeed, truth.pitchspeed, truth.yawspeed
+        self._send(mavlink.MAVLink_attitude_quaternion_message(ms, *truth.attitude_quaternion, *rates))
+        self._send(mavlink.MAVLink_local_position_ned_message(ms, north, east, down, vx + bias, vy, vz))
 
     def poll(self, beat):
         """Answer the received messages; send a heartbeat if `beat`."""
@@ -87,6 +101,7 @@ def main():
     parser.add_argument("--stop", action="store_true")
     parser.add_argument("--starts", type=Path)
     parser.add_argument("--cores", type=Path)
+    parser.add_argument("--estimate", type=float)
     options = parser.parse_args()
     if options.starts:
         with options.starts.open("a") as file:
@@ -100,6 +115,8 @@ def main():
             if other.get_type() == "HIL_GPS":
                 ground = ground or other.alt * 1e-3
                 height, rate = other.alt * 1e-3 - ground, -other.vd * 1e-2
+            elif other.get_type() == "HIL_STATE_QUATERNION" and options.estimate is not None:
+                vehicle.estimate(other, options.estimate)
         peer.skipped.clear()
         time_us = message.time_usec
         vehicle.poll(time_us % 200_000 == 0)

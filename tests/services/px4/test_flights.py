@@ -1,5 +1,6 @@
 """Complete runs with PX4 as the autopilot: a scripted program, and the real one if PX4 is set."""
 
+import json
 import os
 import sys
 from pathlib import Path
@@ -42,6 +43,17 @@ def test_stalled_firmware_is_reported_and_log_readable(tmp_path):
 @pytest.mark.long
 def test_stopped_firmware_loses_no_step(tmp_path):
     assert COUNTS in fly("px4", scripted("px4", "--stop"), "--log", tmp_path / "flight.mcap").stdout
+
+
+def test_shell_is_that_of_the_firmware(tmp_path):
+    program = "--set", f"autopilot.command={json.dumps([sys.executable, '-c', 'print(input()[::-1]); exit(3)'])}"
+    log = "--log", tmp_path / "a.mcap"
+    done = lapwing("run", "px4_quad", "--shell", *program, *log, input="stats rev\n", code=1)
+    assert "ver stats" in done.stdout
+    assert "px4: the program ended (exit code 3) at its start" in done.stderr
+    assert "autopilot.shell" in lapwing("run", "px4_quad", "--shell", *log, code=2).stderr
+    several = lapwing("run", "px4_quad", "--shell", "--mode", "multi-process", *program, *log, code=2).stderr
+    assert "--shell: needs --mode single-process" in several
 
 
 @pytest.mark.long

@@ -8,8 +8,16 @@ from pymavlink.dialects.v20 import all as mavlink
 
 from lapwing.dynamics.environment import STANDARD
 from lapwing.kernels import kernel
-from lapwing.services.common.ports import GPS_FLOAT, GPS_RTK, GPS_SBAS, GPS_SINGLE, DistanceReading, GpsReading
-from lapwing.services.px4.messages import distance_message, gps_message
+from lapwing.services.common.ports import (
+    GPS_FLOAT,
+    GPS_RTK,
+    GPS_SBAS,
+    GPS_SINGLE,
+    DistanceReading,
+    GpsReading,
+    TrueState,
+)
+from lapwing.services.px4.messages import distance_message, gps_message, truth_message
 from lapwing.services.px4.sensor_frame import Sensors, frame, pressure_altitude, read_controls, sensor_frame
 
 
@@ -25,6 +33,21 @@ def packed(message, sequence=0, component=1):
 
 def gps(reading, time_us=4000):
     return mavlink.MAVLink(None).parse_buffer(packed(gps_message(time_us, reading)))[0]
+
+
+def test_true_state_is_that_of_the_plant():
+    """Nose to the east (FLU in ENU is the identity): yaw 90 degrees; 100 m north are 9e-4 degrees of latitude."""
+    state = TrueState((0.0, 100.0, 5.0), velocity_world=(1.0, 2.0, 3.0), omega_body=(0.1, 0.2, 0.3),
+                      acceleration_world=(9.80665, 0.0, 0.0))  # fmt: skip
+    home = STANDARD.home
+    (result,) = mavlink.MAVLink(None).parse_buffer(packed(truth_message(home, 4000, state)))
+    assert result.attitude_quaternion == pytest.approx([math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5)], abs=1e-6)
+    assert 1e-7 * result.lat - home.latitude_deg == pytest.approx(100.0 / 111.1e3, rel=2e-3)
+    assert 1e-7 * result.lon == pytest.approx(home.longitude_deg, abs=1e-7)
+    assert 1e-3 * result.alt == pytest.approx(home.height + 5.0, abs=2e-3)
+    assert (result.vx, result.vy, result.vz) == (200, 100, -300)
+    assert (result.xacc, result.yacc, result.zacc) == (1000, 0, 0)
+    assert [result.rollspeed, result.pitchspeed, result.yawspeed] == pytest.approx([0.1, -0.2, -0.3])
 
 
 def test_level_at_rest_accelerates_up_in_frd():
