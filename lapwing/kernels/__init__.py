@@ -5,19 +5,19 @@ executors (multi-process, single-process, batch) must give bit-for-bit identical
 
 Machine code is stored in the folder `LAPWING_CACHE`, by default ~/.cache/lapwing, and is valid until a source that can
 be in it changes. Compiled again in every process: kernels of a script or notebook itself (`__main__`), and versions for
-arguments that are functions or whose class cannot be imported by name. Put kernels and classes into modules.
+arguments whose class cannot be imported by name. Put kernels and classes into modules.
 """
 
 from lapwing.kernels.compiler.cache import Statistics, on_compile, statistics
 from lapwing.kernels.compiler.cache_files import root as cache_folder
 from lapwing.kernels.compiler.decorators import (
     always_inline,
+    generated,
     kernel,
     no_refcount,
     noinline,
     python_function,
     vectorise_loops,
-    without_cache,
 )
 from lapwing.kernels.compiler.dispatch_table import DispatchTable
 from lapwing.kernels.compiler.source_digest import digest as source_digest
@@ -30,6 +30,7 @@ __all__ = [
     "always_inline",
     "cache_folder",
     "forget_sources",
+    "generated",
     "kernel",
     "no_refcount",
     "noinline",
@@ -38,5 +39,4 @@ __all__ = [
     "source_digest",
     "statistics",
     "vectorise_loops",
-    "without_cache",
 ]

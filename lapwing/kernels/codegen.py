@@ -14,7 +14,7 @@ from numba.core import types
 from numba.core.targetconfig import ConfigStack
 from numba.core.typing.templates import AbstractTemplate, infer_global
 
-from lapwing.kernels import without_cache
+from lapwing.kernels import generated
 
 GENERATORS: dict[Callable, Callable[..., Any]] = {}
 """Functions with a separate implementation in compiled code, and its generator from the numba types of arguments."""
@@ -28,7 +28,7 @@ def compile_source(signature: str, names: Mapping[str, Any], *lines: str) -> Cal
         names: objects that the body may refer to.
         lines: statements of the body.
     """
-    scope = dict(names)
+    scope = {"__name__": __name__, **names}  # the cache requires a module
     exec("\n    ".join([f"def {signature}:", *lines]), scope)
     return scope[signature.partition("(")[0]]
 
@@ -79,7 +79,7 @@ def _implement(function: Callable, choose: Callable[..., Any], inline: bool) -> 
             flags = ConfigStack().top().copy()
             flags.forceinline = flags.forceinline or inline
             if (args, flags.forceinline) not in chosen:
-                chosen[args, flags.forceinline] = without_cache(choose(*args))
+                chosen[args, flags.forceinline] = generated(choose(*args), flags.forceinline)
             kernel = types.Dispatcher(chosen[args, flags.forceinline])
             with ConfigStack().enter(flags):
                 signature = kernel.get_call_type(self.context, args, {})

@@ -113,6 +113,22 @@ from plant.large import middle
 def outermost(x):
     return middle(x) + 1.0
 """,
+    "plant/tuples.py": """
+from lapwing.kernels import always_inline, kernel
+from lapwing.kernels.codegen import map_tuple
+
+@always_inline
+def product(factor, x, y):
+    return factor * x * y
+
+@kernel
+def products(x):
+    return map_tuple(product, x, (x, 1.0), (2.0, 3.0))
+
+@kernel
+def last(x):
+    return map_tuple(product, x, (x, 1.0), (2.0, 3.0))[1]
+""",
     "plant/slow.py": """
 import os, time
 from lapwing.kernels.codegen import overload_for

@@ -77,6 +77,16 @@ def test_edit_of_reachable_source_recompiles(package, statements, file, old, new
     assert package.run(statements)["compiled"] == 0  # the cache has both versions
 
 
+def test_generated_function_is_compiled_once(package):
+    """It has a function as an argument, too."""
+    run = "from plant.tuples import {0}; values['{0}'] = {0}(3.0)"
+    assert package.run(run.format("products"))["values"] == {"products": [18.0, 9.0]}
+    other = package.run(run.format("last"))
+    assert (other["values"], other["compiling"]) == ({"last": 9.0}, ["plant.tuples.last"])
+    package.edit("plant/tuples.py", "factor * x", "factor + x")
+    assert package.run(run.format("last"))["values"] == {"last": 6.0}
+
+
 def test_edit_of_unreachable_source_compiles_no_kernel(package):
     package.run(OUTER)
     package.edit("plant/law.py", "10.0", "20.0")

@@ -29,6 +29,13 @@ def all_stiff_sleeping(effects: Any, memory: Any, motion: Any, h: Any) -> Callab
     )
 
 
+def only_stiff_sleep(effects: Any) -> bool:
+    """Return True if every effect that can sleep is stiff, by the type of the tuple of effects."""
+    sleeps, stiff = (HOOKS["is_sleeping"], HOOKS["can_sleep"]), (HOOKS["is_sleeping"], HOOKS["substeps"])
+    classes = [e.instance_class for e in effects.types if any(e.instance_class in hook for hook in sleeps)]
+    return all(each in hook for each in classes for hook in stiff)
+
+
 @generic(inline=True)
 def without_sleepers(effects: Any, values: Any) -> Callable:
     """Return the members of `values`, one for each effect, that belong to effects that never sleep."""

@@ -1,7 +1,6 @@
 """Steps of any method on any system, both selected by the type of an argument, compiled once and cached on disk.
 
-Kernels with functions as arguments cannot be cached on disk; a method's empty `Method` class and a system's parameter
-class take their place.
+A method's empty `Method` class and a system's parameter class stand for their functions: values of them can be stored.
 """
 
 import sys

@@ -260,6 +260,14 @@ def airborne_step(method, drive, t, x, h):
     return x, stiff_effects.with_awake(p.effects, memory, awake)
 
 
+@generic(inline=True)
+def _mixed_step(effects, method, drive, t, x, h):
+    """Return (motion, memory) a step later in which some effects sleep but no stiff one is awake."""
+    if stiff_effects.only_stiff_sleep(effects):  # there is no such step
+        return lambda effects, method, drive, t, x, h: (x, drive.memory)
+    return lambda effects, method, drive, t, x, h: _step_with_memories(effects, method, drive, t, x, h)
+
+
 @always_inline
 def next_break(p, memory, start, interval, end, h):
     """Return the first breakpoint [s] between `start` and `end` that is not close to either; infinity if there is none.
@@ -295,7 +303,7 @@ def steps(method, drive, x, start, end, h, first, n):
             if switching or not stiff_effects.all_stiff_sleeping(p.effects, memory, seen, h):
                 x, memory = _stiff_steps(method, drive, start + i * h, x, h, until)
                 break
-            x, memory = _step_with_memories(p.effects, method, drive, start + i * h, x, h)
+            x, memory = _mixed_step(p.effects, method, drive, start + i * h, x, h)
         if not stop < end:
             return x, memory
         memory = hooks.all_timed_updates(p.effects, memory, stop)

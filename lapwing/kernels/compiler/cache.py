@@ -1,6 +1,7 @@
 """Disk cache of one kernel: a file for each compiled version, named by its key."""
 
 import contextlib
+import copy
 import pickle
 import warnings
 from collections.abc import Callable
@@ -110,10 +111,11 @@ class KernelCache(_Cache):
         if _HASH_SECRET in content:  # numba defines these symbols with its implementations
             target_context.refresh()
         with contextlib.suppress(Exception):  # any error here only leads to a new compilation
-            stored, payload = pickle.loads(content)
-            result = self._rebuild(target_context, payload)
-            if stored == current and result.signature.args == sigutils.normalize_signature(sig)[0]:
-                return result
+            stored, (code, fndesc, environment, signature, *rest) = pickle.loads(content)
+            if stored == current:
+                fndesc.argtypes = sigutils.normalize_signature(sig)[0]
+                signature = signature.replace(args=fndesc.argtypes)
+                return self._rebuild(target_context, (code, fndesc, environment, signature, *rest))
         return None
 
     def _is_inner(self, result: CompileResult | None = None) -> bool:
@@ -121,8 +123,14 @@ class KernelCache(_Cache):
         return False
 
     def _reduce(self, result: CompileResult) -> tuple:
-        """Return the stored parts of a result."""
-        return result._reduce()
+        """Return the stored parts of a result.
+
+        Types of arguments are left out: the key has them, and numba would restore functions as other types.
+        """
+        code, fndesc, environment, signature, *rest = result._reduce()
+        fndesc = copy.copy(fndesc)
+        fndesc.argtypes = ()
+        return code, fndesc, environment, signature.replace(args=()), *rest
 
     def _rebuild(self, target_context: Any, payload: tuple) -> CompileResult:
         """Return the result that is rebuilt from its stored parts."""

@@ -88,10 +88,17 @@ class _Writer:
 
     def of_type(self, value: types.Type) -> str:
         """Return the text of a type; types with equal classes and keys are equal."""
-        if isinstance(value, types.Dispatcher):  # numba would rebuild it as another type
-            raise NotKeptError("a function as an argument")
-        inside = (value.key, value._fields) if isinstance(value, types.StructRef) else value.key
-        return f"{self.of_class(type(value))}[{self.value(inside)}]"
+        if isinstance(value, types.Dispatcher):
+            return self.value(value.dispatcher)
+        if id(value) not in _types:  # parts of a type with hundreds of numbers are in most types of a scene
+            own = _Writer()
+            inside = (value.key, value._fields) if isinstance(value, types.StructRef) else value.key
+            text = f"{own.of_class(type(value))}[{own.value(inside)}]"
+            _types[id(value)] = value, text, own.functions, own.modules
+        _, text, functions, modules = _types[id(value)]
+        self.functions += functions
+        self.modules |= modules
+        return text
 
     def of_class(self, value: type) -> str:
         """Return the text of a class: its name and its entries in dispatch tables."""
@@ -139,15 +146,12 @@ def _codes(code: CodeType) -> Iterable[CodeType]:
 
 
 _parts: dict[FunctionType, Part] = {}
-_entered = 0
+_types: dict[int, tuple[types.Type, str, list[FunctionType], set[str]]] = {}  # by identity: types are unique
+_entered = 0  # of the dispatch tables, whose entries are in both
 
 
 def _part(function: FunctionType) -> Part:
     """Return the text of one function: its code and the references of its names, closure and defaults."""
-    global _entered
-    if _entered != DispatchTable.entered:
-        _parts.clear()
-        _entered = DispatchTable.entered
     part = _parts.get(function)
     if part and all(namespace.get(name) is value for namespace, name, value in part.references):
         return part
@@ -184,6 +188,11 @@ def key(dispatcher: Dispatcher, arguments: tuple, returns: Any, target: tuple) -
     Raises:
         NotKeptError: no key is equal in every process.
     """
+    global _entered
+    if _entered != DispatchTable.entered:
+        _parts.clear()
+        _types.clear()
+        _entered = DispatchTable.entered
     writer = _Writer()
     text = writer.value((dispatcher, *arguments, returns))
     reached, done = {text}, set()

@@ -34,9 +34,9 @@ def _compile(function: Callable, **options: Any) -> Any:
     return compiled
 
 
-def without_cache(function: Any) -> Any:
-    """Compile a function without storing its code on disk; return a kernel unchanged."""
-    return function if isinstance(function, _Dispatcher) else _Dispatcher(function, targetoptions={"nopython": True})
+def generated(function: Any, inline: bool) -> Any:
+    """Compile a function made for the types of its arguments; return a kernel unchanged."""
+    return function if isinstance(function, _Dispatcher) else _compile(function, forceinline=inline)
 
 
 @cache

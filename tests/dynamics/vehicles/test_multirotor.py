@@ -3,12 +3,14 @@
 import math
 from pathlib import Path
 
+import numba
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 from scipy.spatial.transform import Rotation
 
 from lapwing.dynamics import effects
+from lapwing.dynamics.effects._stiff_effects import only_stiff_sleep
 from lapwing.dynamics.integrators import get
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
 from lapwing.dynamics.noise import stream_key
@@ -163,3 +165,17 @@ def test_current_and_power_at_hover():
     assert 250.0 < o.motor_power[0] < 450.0
     off = multirotor.observe(BARE, 0, 0.004, start(), (0.0,) * 4)
     assert off.motor_current == (0.0,) * 4
+
+
+@pytest.mark.parametrize(
+    ("names", "expected"),
+    [
+        ((), True),
+        (("ground_contact",), True),
+        (("ground_effect",), False),
+        (("ground_contact", "ground_effect"), False),
+    ],
+)
+def test_steps_with_some_effects_asleep_are_compiled_where_one_of_them_is_not_stiff(names, expected):
+    active = effects.from_scene({name: {} for name in ("gravity", "rotor_thrust", *names)}, DRONE)
+    assert only_stiff_sleep(numba.typeof(active)) is expected
