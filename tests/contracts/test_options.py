@@ -74,7 +74,9 @@ ELSEWHERE = {  # other tests by option; a test's file contains the option
         "--instance": "tests/flights/log_import/test_log_doubts.py::test_command_ends_with_table_and_takes_instance",
         "--twist-frame": "tests/flights/log_import/test_bag_frames.py::test_twist_that_contradicts_position",
     },
+    "feed": dict.fromkeys(("--command", "--firmware", "--set", "--skip"), "tests/flights/log_import/test_feed.py"),
     "run": {
+        "--shell": "tests/services/px4/test_flights.py",
         "--firmware-schedule": "tests/services/ardupilot/test_flights.py",
         "--allow-code": "tests/fmi/importer/test_import.py",
         "--force": "tests/studies/tune/test_procedure.py::test_force_flies_unstable_gains",
