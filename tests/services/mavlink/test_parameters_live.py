@@ -100,6 +100,43 @@ def test_satellites_of_simulated_gps_decide_fix_and_arming(station):
     station.receive("SYS_STATUS", lambda m: m.onboard_control_sensors_health & gps)
 
 
+@pytest.mark.nightly
+def test_address_and_type_of_vehicle_are_set(station):
+    armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    assert station.set("MAV_TYPE", mavlink.MAV_TYPE_HEXAROTOR) == mavlink.MAV_TYPE_HEXAROTOR
+    station.receive("HEARTBEAT", lambda m: m.type == mavlink.MAV_TYPE_HEXAROTOR)
+    for name, value in (("MAV_TYPE", mavlink.MAV_TYPE_FIXED_WING), ("MAV_SYS_ID", 251)):
+        assert station.error(name, as_float(value), INTEGER) == OUT_OF_RANGE
+        station.receive("PARAM_VALUE", lambda m, name=name: m.param_id == name)
+    assert station.set("MAV_SYS_ID", 42) == 42
+    station.receive("HEARTBEAT", lambda m: m.get_srcSystem() == 1)
+    reboot = mavlink.MAV_CMD_PREFLIGHT_REBOOT_SHUTDOWN
+    station.take_off()
+    assert station.command(reboot, 1.0) == mavlink.MAV_RESULT_DENIED
+    assert station.command(mavlink.MAV_CMD_NAV_LAND) == mavlink.MAV_RESULT_ACCEPTED
+    station.receive("HEARTBEAT", lambda m: not m.base_mode & armed and m.get_srcSystem() == 1)
+    assert station.command(reboot, 1.0) == mavlink.MAV_RESULT_ACCEPTED
+    station.receive("HEARTBEAT", lambda m: m.get_srcSystem() == 42)
+    station.receive("GLOBAL_POSITION_INT", lambda m: m.get_srcSystem() == 42)
+    station.link.mav.param_set_send(42, 1, b"MIS_TAKEOFF_ALT", 4.0, REAL)
+    message = station.receive("PARAM_VALUE", lambda m: m.param_id == "MIS_TAKEOFF_ALT")
+    assert (message.get_srcSystem(), message.param_value) == (42, 4.0)
+
+
+@pytest.mark.nightly
+def test_arming_does_not_require_optional_sensor(station):
+    arm = mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0
+    ready = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    station.receive("SYS_STATUS", lambda m: m.onboard_control_sensors_health & ready)
+    off = mavlink.FAILURE_UNIT_SENSOR_BARO, mavlink.FAILURE_TYPE_OFF
+    assert station.command(mavlink.MAV_CMD_INJECT_FAILURE, *off) == mavlink.MAV_RESULT_ACCEPTED
+    station.receive("SYS_STATUS", lambda m: not m.onboard_control_sensors_health & ready)
+    assert station.command(*arm) != mavlink.MAV_RESULT_ACCEPTED
+    assert station.set("SYS_HAS_BARO", 0) == 0
+    station.receive("SYS_STATUS", lambda m: m.onboard_control_sensors_health & ready)
+    assert station.command(*arm) == mavlink.MAV_RESULT_ACCEPTED
+
+
 @pytest.mark.parametrize("station", [["--set", "autopilot.parameters.SYS_HAS_GPS=0"]], indirect=True)
 def test_autopilot_without_gps_rejects_arming(station):
     gps = mavlink.MAV_SYS_STATUS_SENSOR_GPS
@@ -109,6 +146,55 @@ def test_autopilot_without_gps_rejects_arming(station):
     station.receive("GLOBAL_POSITION_INT", lambda m: m.time_boot_ms > start + 5000)
     assert not station.receive("SYS_STATUS").onboard_control_sensors_health & gps
     assert station.command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0, 0.0) != mavlink.MAV_RESULT_ACCEPTED
+
+
+@pytest.mark.nightly
+def test_vehicle_lands_after_loss_of_link_and_by_command(station):
+    """Three flights: the station sends no heartbeat after its first, LAND, and RTL, which is overhead."""
+    armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    station.take_off()
+    assert station.set("NAV_DLL_ACT", 2) == 2  # return; in flight, because the link is lost already
+    station.receive("HEARTBEAT", lambda m: not m.base_mode & armed)
+    assert station.set("NAV_DLL_ACT", 0) == 0
+    for number in (mavlink.MAV_CMD_NAV_LAND, mavlink.MAV_CMD_NAV_RETURN_TO_LAUNCH):
+        station.take_off()
+        assert station.command(number) == mavlink.MAV_RESULT_ACCEPTED
+        station.receive("HEARTBEAT", lambda m: not m.base_mode & armed)
+        station.receive("EXTENDED_SYS_STATE", lambda m: m.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND)
+    place = station.receive("LOCAL_POSITION_NED")
+    assert math.dist((place.x, place.y, place.z), (0.0, 0.0, 0.0)) < 1.0
+
+
+@pytest.mark.nightly
+@pytest.mark.parametrize("station", [["--set", "effects.payload_release={}"]], indirect=True)
+def test_disabled_gripper_fails(station):
+    release = mavlink.MAV_CMD_DO_GRIPPER, 1.0, mavlink.GRIPPER_ACTION_RELEASE
+    assert station.set("PD_GRIPPER_EN", 0) == 0
+    assert station.command(*release) == mavlink.MAV_RESULT_FAILED
+    station.link.mav.param_set_send(1, 1, b"PD_GRIPPER_EN", as_float(1), INTEGER)
+    station.receive("PARAM_VALUE", lambda m: m.param_id == "PD_GRIPPER_EN" and m.param_value == as_float(1))
+    assert station.command(*release) == mavlink.MAV_RESULT_ACCEPTED
+
+
+@pytest.mark.nightly
+def test_detection_of_motor_failures_is_switched_in_flight(station):
+    critical, armed = mavlink.MAV_STATE_CRITICAL, mavlink.MAV_MODE_FLAG_SAFETY_ARMED
+    assert station.set("FD_ACT_EN", 0) == 0
+    assert station.set("CA_FAILURE_MODE", 0) == 0
+    assert station.set("RTL_APPR_FORCE", 0) == 0
+    now = station.take_off().time_boot_ms
+    assert (
+        station.command(
+            mavlink.MAV_CMD_INJECT_FAILURE, mavlink.FAILURE_UNIT_SYSTEM_MOTOR, mavlink.FAILURE_TYPE_WRONG, 1.0
+        )
+        == mavlink.MAV_RESULT_ACCEPTED
+    )
+    while (m := station.receive(["GLOBAL_POSITION_INT", "HEARTBEAT"])).get_type() == "HEARTBEAT" or (
+        m.time_boot_ms < now + 3000
+    ):
+        assert m.get_type() != "HEARTBEAT" or (m.system_status != critical and m.base_mode & armed)
+    assert station.set("FD_ACT_EN", 1) == 1
+    station.receive("HEARTBEAT", lambda m: m.system_status == critical)
 
 
 WHOLE = (
