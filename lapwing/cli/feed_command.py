@@ -21,7 +21,7 @@ def feed(
     skip: Annotated[float, typer.Option(metavar="S", min=0.0, help="time until the filter has settled")] = 15.0,
     set_: Overrides = None,
 ) -> None:
-    """Play the sensors of a recorded flight into a firmware, and compare its estimate with the recorded one.
+    """Play a recorded flight into a firmware, and compare the estimates.
 
     With several builds, also compare their estimates with each other.
     """
