@@ -21,7 +21,7 @@ def feed(
     skip: Annotated[float, typer.Option(metavar="S", min=0.0, help="time until the filter has settled")] = 15.0,
     set_: Overrides = None,
 ) -> None:
-    """Play a recorded flight into a firmware, and compare the estimates.
+    """Play a recorded flight into a firmware and compare estimates.
 
     With several builds, also compare their estimates with each other.
     """
