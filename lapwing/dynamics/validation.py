@@ -62,7 +62,8 @@ def _in_degrees(value: Any, location: Sequence[str | int], model: Any) -> Any:
             inner = value[first]
         except (KeyError, IndexError, TypeError):  # the name of a member of a union
             return value
-        return _replaced(value, [first], _in_degrees(inner, rest, follow(model, [first])))
+        converted = _in_degrees(inner, rest, follow(model, [first]))
+        return value if converted is inner else _replaced(value, [first], converted)
     base = str(first).removesuffix("_deg")
     if base == first or "deg" not in units.UNITS.get(_unit(model, [base]).strip(" []"), {}):
         return value
