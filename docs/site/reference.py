@@ -19,7 +19,7 @@ SCENE = """A scene is a TOML file. Override any key with `--set KEY=VALUE`, for 
 A table that a scene does not name is not simulated and costs nothing. Numbers are in the unit in brackets, or texts
 with another unit of its kind: `"30 deg"`, `"60 km/h"`, `"7 in"`. A key for an angle may have the ending `_deg`, as in
 `heading_deg = 30`. `lapwing schema` writes the JSON schema for [editors](../guides/editors.md), and
-`lapwing effects --list` prints the effects with their keys."""
+`lapwing effects --list` prints the effects with cost and keys."""
 AIRFRAME = """A TOML file that `vehicle.airframe` names. [Your own airframe](../guides/new_airframe.md) describes how to
 measure the numbers."""
 GAINS = "A TOML file that `autopilot.gains` names. `lapwing tune` designs one."

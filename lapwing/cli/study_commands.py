@@ -74,7 +74,7 @@ def effects(
         Path | None, typer.Argument(metavar="SCENE", help="scene file (TOML), or name of a shipped scene")
     ] = None,
     set_: Overrides = None,
-    listed: Annotated[bool, typer.Option("--list", help="list all effects with their keys instead")] = False,
+    listed: Annotated[bool, typer.Option("--list", help="list all effects with cost and keys instead")] = False,
     tolerance: Annotated[float, typer.Option(metavar="M", help="largest permitted change of the trajectory")] = 0.01,
     only: Annotated[
         str | None, typer.Option(metavar="NAME,...", help="effects to study; all without this option")

@@ -6,6 +6,7 @@ from collections.abc import Iterator
 from types import ModuleType
 
 from lapwing.dynamics import effects
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.file_schemas.key_docs import Key, description, first_sentence, keys
 
 CITATION = re.compile(r" \(theory[^)]*\)")
@@ -59,11 +60,27 @@ def effect_settings(name: str) -> type:
 
 
 def effects_list(names: list[str] | None = None) -> Iterator[str]:
-    """Yield a line about each effect and each of its keys."""
+    """Yield a line about each effect, with its cost, and each of its keys; the last line explains costs."""
+    from lapwing.studies.effects.operations import FLIGHT, operations  # needs mpmath
+
     for name in names or effects.names():
-        yield f"{name}: {effect(name)}"
+        yield f"{name}: {effect(name)}; {_cost(name)}"
         for key in keys(effect_settings(name)):
             yield f"    {key.name}{_value(key)}: {description(key)}"
+    yield (
+        f"Operations: in a step of RK4 of 1 ms, hovering at 10 m; {operations(FLIGHT)} with {' and '.join(FLIGHT)}. "
+        "`lapwing effects SCENE` measures nanoseconds."
+    )
+
+
+def _cost(name: str) -> str:
+    """Return the cost of an effect for the delivery drone."""
+    from lapwing.studies.effects.operations import added_operations
+
+    try:
+        return f"adds {added_operations(name)} operations"
+    except ConfigError as error:
+        return f"not counted, because {error.message.partition(';')[0]}"
 
 
 def _value(key: Key) -> str:

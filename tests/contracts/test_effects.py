@@ -18,6 +18,7 @@ from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
 from lapwing.kernels import always_inline, kernel
+from lapwing.studies.effects.operations import EXAMPLES as NEEDED
 
 ROOT = Path(__file__).parents[2]
 DRONE = load_airframe(ROOT / "lapwing/scenes/vehicles/delivery_drone.toml")
@@ -25,20 +26,6 @@ EULER, RK4 = get("lie_euler").Method(), get("rk4_renormalised").Method()
 KEY = stream_key(1, "drone1", "effects")
 HOVER = (32.6, 32.5, 32.7, 32.6)
 
-NEEDED = {  # required keys
-    "ceiling_effect": {"height": 12.0},
-    "rotor_quadratic": {"thrust_constant": 2.2e-4, "torque_constant": 8.6e-6},
-    "rotational_drag": {"linear": [0.1, 0.1, 0.1]},
-    "rotor_damage": {"rotor": 1},
-    "rotor_table": {"advance": [0.0, 0.2], "thrust": [[0.1, 0.08]], "power": [[0.04, 0.038]]},
-    "shared_slung_load": {"mass": 2.0, "length": 3.0},
-    "wind_constant": {"velocity": [3.0, 1.0, 0.0]},
-    "wind_dryden": {"wind_speed": 5.0},
-    "wind_dryden_rates": {"wind_speed": 5.0},
-    "wind_von_karman": {"wind_speed": 5.0},
-    "wind_boundary_layer": {"speed": 5.0},
-    "wind_gust": {"peak": [3.0, 0.0, 0.0], "start": 0.0, "duration": 1.0},
-}
 OTHERS = (  # excluded by another effect of `ALL`
     "battery_thevenin", "coaxial_interference", "gravity", "ground_effect", "dynamic_inflow", "rotor_interference",
     "rotor_quadratic", "rotor_table", "wind_dryden_rates", "wind_von_karman",

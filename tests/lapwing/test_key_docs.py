@@ -139,10 +139,20 @@ def test_schema_describes_every_key(kind):
 def test_list_has_every_effect_and_key():
     done = CliRunner().invoke(app, ["effects", "--list"])
     assert done.exit_code == 0, done.output
-    lines = done.output.splitlines()
+    *lines, explanation = done.output.splitlines()
+    assert explanation.startswith("Operations: in a step of RK4")
     assert [line.partition(":")[0] for line in lines if not line.startswith(" ")] == effects.names()
-    assert "wind_gust: Single discrete gust" in lines
     assert [line for line in lines if line.endswith(": ")] == []
+    costs = dict(re.findall(r"^(\w+): .+; adds (\d+) operations$", done.output, re.MULTILINE))
+    assert effects.names() == sorted([*costs, "coaxial_interference"])  # the drone has no coaxial rotors
+    assert (
+        "coaxial_interference: Thrust loss of a rotor in the wake of a rotor above it; not counted, because"
+        in done.output
+    )
+    # each of the four evaluations and the split of the step add three components to the wind, and rotate a force
+    assert 4 * 3 <= int(costs["wind_constant"]) <= 5 * 9
+    assert 4 * 15 <= int(costs["body_wrench"]) <= 5 * 24
+    assert int(costs["wind_constant"]) < int(costs["body_drag"]) < int(costs["battery"]) < int(costs["dynamic_inflow"])
 
 
 def test_every_preset_is_described():

@@ -92,8 +92,8 @@ def _label(axes: Axes, curves: dict[str, np.ndarray], selected: Point | None) ->
     ends = {name: (float(curve[0, -1]), float(curve[1, -1])) for name, curve in curves.items() if curve.size}
     height = {name: (np.log10(end[1]) - low) / (high - low) for name, end in ends.items()}
     upper = 1.0 + LABEL
-    for number, name in sorted(enumerate(ends), key=lambda item: -height[item[1]]):
-        upper = max(min(height[name], upper - LABEL), LABEL * sum(height[n] < height[name] for n in ends))
+    for below, (number, name) in enumerate(sorted(enumerate(ends), key=lambda item: -height[item[1]]), 1 - len(ends)):
+        upper = max(min(height[name], upper - LABEL), -LABEL * below)
         text = f"{name}, chosen" if selected is not None and selected.method == name else name
         axes.annotate(
             text, ends[name], xytext=(1.03, upper), textcoords="axes fraction", va="center", fontsize=9.5,
@@ -122,4 +122,4 @@ def draw_error_sources(axes: Axes, parts: Sequence[ErrorSource]) -> None:
     axes.set_title("error sources of the flight")
     axes.set_xlabel("step, or communication step [ms]")
     axes.set_ylabel(f"difference of {'position' if moves else 'attitude'}, 90th percentile [{'m' if moves else 'rad'}]")
-    axes.legend()
+    axes.legend(loc="upper center", bbox_to_anchor=(0.5, -0.12), ncols=3)

@@ -6,6 +6,7 @@ import time
 
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 from lapwing.studies.accuracy.error_budget import SOURCES
 from lapwing.studies.accuracy.problem import Problem, SolverMethod, SolverRun
@@ -13,7 +14,7 @@ from lapwing.studies.accuracy.targets import find, scene_of
 from lapwing.studies.accuracy.work_precision import Point, cheapest, check_target, measure, pareto_points
 from lapwing.views.studies import accuracy_command
 from lapwing.views.studies import accuracy_command as console_output
-from lapwing.views.studies.accuracy_plot import draw
+from lapwing.views.studies.accuracy_plot import LABEL, draw, draw_points
 from lapwing.views.terminal import console
 
 
@@ -183,3 +184,14 @@ def test_table_fits_80_columns(capsys):
     assert "…" not in output
     assert "0.0572 ms" in output
     assert "12345678" in output
+
+
+def test_labels_of_curves_that_end_together_are_apart():
+    axes = Figure().subplots()
+    names = [f"method{k}" for k in range(6)]
+    points = [Point(name, 4, "s", h, 1e-6 * h**4, 1e-4 / h, round(1.0 / h), {}) for name in names for h in (1.0, 0.1)]
+    draw_points(axes, points, 1e-6, None)
+    heights = sorted(text.xyann[1] for text in axes.texts if text.get_text() in names)
+    assert len(heights) == 6
+    assert min(np.diff(heights)) > 0.99 * LABEL
+    assert heights[0] >= 0.0

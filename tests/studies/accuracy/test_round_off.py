@@ -81,6 +81,18 @@ def test_elementary_functions_have_extended_precision() -> None:
         assert abs(mpmath.mpf(value) - exact) < 1e-30
 
 
+@always_inline
+def count(x):
+    n = 0
+    for _ in range(math.floor(x), math.ceil(x) + 1):
+        n += 1
+    return n
+
+
+def test_rounded_numbers_count_as_in_kernels() -> None:
+    assert extend(count)(Number(1.25)) == 2
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["free_rigid_body", "multirotor", "os4_experiment_4"])
 def test_round_off_of_flight_is_above_that_of_one_step_and_small(name: str) -> None:
