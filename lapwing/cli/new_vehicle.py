@@ -48,10 +48,10 @@ def vehicle(
     typer.echo(lift)
     for remark in remarks:
         typer.echo(f"lapwing: warning: {remark}", err=True)
-    airframe_option = f"--set vehicle.airframe={path.resolve()}"
+    airframe = f"--set vehicle.airframe={path}"
     typer.echo(
-        f"next: lapwing performance {path}; lapwing tune excitation {airframe_option} --out gains.toml; "
-        f"lapwing run delivery_mission {airframe_option} --set autopilot.gains={Path('gains.toml').resolve()}"
+        f"next:\n  lapwing performance {path}\n  lapwing tune excitation {airframe} --out gains.toml\n"
+        f"  lapwing run delivery_mission {airframe} --set autopilot.gains=gains.toml"
     )
 
 

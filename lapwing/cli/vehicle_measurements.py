@@ -38,7 +38,7 @@ class Figure(NamedTuple):
         if value is None:
             others = ", ".join(name for name in units.UNITS.get(self.unit, ()) if name not in (self.unit, '"'))
             expected = f"a number in {self.unit}" + (f", or with a unit of {others}" if others else "")
-            raise ConfigError(self.name, f"got {text!r}", expected)
+            raise ConfigError(self.name, f"got {text!r}", "a whole number" if self.unit == "count" else expected)
         self.check(value)
         return value
 

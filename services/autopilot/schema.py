@@ -86,7 +86,7 @@ class Autopilot(FirmwareKeys):
             elif isinstance(code, str) and (module := user_code.split_reference(where, code)[0]) != user_code.MEMORY:
                 user_modules.embed(tree, files, where, module)
         if isinstance(file := unvalidated_value(tree, cls.TABLE, "parameters"), str):
-            path = files.folder / file
+            path = files.path("autopilot.parameters", file)
             text = files.text("autopilot.parameters", "autopilot.parameters", path)
             tree[cls.TABLE]["parameters"] = parse(text, path)
 

@@ -31,7 +31,8 @@ def embed(tree: dict[str, Any], files: Files, key: str, module: str) -> None:
     Raises:
         ConfigError: the module is missing or cannot be read.
     """
-    for name, path in user_module.find(key, module, files.folder).items():
+    folder = files.path(key, f"{module}.py").parent
+    for name, path in user_module.find(key, module, folder).items():
         tree.setdefault(Modules.TABLE, {})[name] = files.text(f"{Modules.TABLE}.{name}", key, path)
 
 

@@ -105,7 +105,7 @@ class Trajectory(Route, Phases, SceneTable):
                     if isinstance(module := segment.get("module"), str):
                         user_modules.embed(tree, files, f"{key}.module", module)
                     elif isinstance(file := segment.get("file"), str):
-                        path = files.folder / file
+                        path = files.path(f"{key}.file", file)
                         segment["points"] = parse_table(files.text(f"{key}.points", f"{key}.file", path), path)
 
     def check(self, scene: Scene) -> None:

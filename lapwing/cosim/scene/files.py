@@ -1,6 +1,7 @@
 """Files of a scene: located by path or name, read once, and stored for the log."""
 
 import tomllib
+from collections.abc import Collection
 from functools import lru_cache
 from os.path import isfile  # returns False for invalid file names
 from pathlib import Path
@@ -14,11 +15,19 @@ from lapwing.dynamics.input_file import read_bytes
 class Files:
     """Reader of the files of one scene."""
 
-    def __init__(self, folder: Path):
+    def __init__(self, folder: Path, overridden: Collection[str] = ()):
         self.folder = folder  # folder of the scene; paths are relative to it
+        self.overridden = overridden  # keys of overrides; their paths are relative to the working directory, too
         self.sources: dict[str, bytes] = {}  # contents of the files that were read, by file name: airframe.toml
         self.read_from: dict[str, Path] = {}  # file by the dotted key of its content in the scene
         self.texts: dict[str, str] = {}  # text of the file by the same key
+
+    def path(self, key: str, name: str) -> Path:
+        """Return the path of a name: relative to the scene; of an override, relative to the working directory first."""
+        return Path(name).resolve() if self._is_overridden(key) and isfile(name) else self.folder / name
+
+    def _is_overridden(self, key: str) -> bool:
+        return any(f"{key}.".startswith(f"{overridden}.") for overridden in self.overridden)
 
     def find(self, key: str, kind: str, name: str, local_folder: str, shipped: Path) -> Path:
         """Return the TOML file that a key names: by path, or by name in the scene's folder or in the package.
@@ -26,7 +35,7 @@ class Files:
         Args:
             key: dotted key whose value is the name.
             kind: kind of file, for the message.
-            name: path that ends in .toml, relative to the scene; or a name.
+            name: path that ends in .toml, see `path`; or a name.
             local_folder: name of a folder next to the scene.
             shipped: folder of the package.
 
@@ -34,11 +43,11 @@ class Files:
             ConfigError: there is no such file; lists the choices.
         """
         if name.endswith(".toml"):
-            if not isfile(self.folder / name):
-                raise ConfigError(
-                    key, f"no file {self.folder / name}", "the path of a .toml file relative to the scene, or a name"
-                )
-            return self.folder / name
+            if isfile(path := self.path(key, name)):
+                return path
+            either = " or the working directory" if self._is_overridden(key) else ""
+            expected = f"the path of a .toml file relative to the scene{either}, or a name"
+            raise ConfigError(key, f"no file {path}", expected)
         folders = (self.folder / local_folder, shipped)
         for folder in folders:
             if isfile(folder / f"{name}.toml"):

@@ -56,9 +56,10 @@ def with_overrides(scene: Scene, overrides: Overrides, vocabulary: Vocabulary) -
 
 
 def _parse(path: Path, text: str, overrides: list[Override], vocabulary: Vocabulary) -> Scene:
-    tree, files = parse_toml(text, path), Files(path.parent)
+    keys = [o.key for o in overrides]
+    tree, files = parse_toml(text, path), Files(path.parent, keys)
     files.sources[SCENE_FILE] = text.encode()
-    locate = partial(_locate, path=path, text=text, keys=[o.key for o in overrides], files=files)
+    locate = partial(_locate, path=path, text=text, keys=keys, files=files)
     with Scene(path, {}, vocabulary, locate=locate).located():
         vehicles = vehicle_scenes.count(tree)
         if vehicles:
@@ -91,8 +92,9 @@ def _member(
     path: Path, text: str, tree: dict[str, Any], i: int, overrides: list[Override], vocabulary: Vocabulary
 ) -> Scene:
     """Return the scene of vehicle i of several."""
-    files, keys = Files(path.parent), [o.key for o in overrides]
+    keys = [o.key for o in overrides]
     own_overrides = vehicle_scenes.overrides_of(overrides, i, vehicle_scenes.count(tree), vocabulary)
+    files = Files(path.parent, [o.key for o in own_overrides])
     locate = partial(_locate_own, vehicle=i, path=path, text=text, keys=keys, files=files)
     scene = _scene(path, vehicle_scenes.member(tree, i, vocabulary), own_overrides, vocabulary, files, locate)
     name = scene.lookup(f"{vehicle_scenes.VEHICLE}.name")

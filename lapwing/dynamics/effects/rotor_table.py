@@ -1,7 +1,7 @@
 """Measured thrust and torque of the rotors: coefficients over advance ratio and inflow angle."""
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Annotated, Any, NamedTuple
 
@@ -80,13 +80,13 @@ def check(table: Mapping[str, Any], tables: Mapping[str, Any]) -> None:
             reject(f"replaces effects.{name}; keep one of them")
 
 
-def embed(table: dict[str, Any], folder: Path) -> None:
-    """Read the file of a scene's table into the table. Raise ConfigError if it is invalid."""
+def embed(table: dict[str, Any], path_of: Callable[[str], Path]) -> None:
+    """Read the file of a scene's table, at the path of its name, into the table. Raise ConfigError if it is invalid."""
     if not isinstance(file := table.get("file"), str):
         return
     if settings := {"advance", "angle_deg", "thrust", "power"} & set(table):
         raise ConfigError(min(settings), "set together with file", "one of them")
-    path = folder / file
+    path = path_of(file)
     try:
         table.update(parse_table("file", read_text(path)))
     except OSError as error:

@@ -34,9 +34,9 @@ class Services(NamedTables):
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
         """Make the paths of FMUs absolute, so that a log can be resimulated from another folder, or embed them."""
         entries = tree.get(cls.TABLE, {})
-        for entry in entries.values() if isinstance(entries, dict) else ():
+        for name, entry in entries.items() if isinstance(entries, dict) else ():
             if isinstance(entry, dict) and isinstance(path := entry.get("fmu"), str):
-                absolute = (files.folder / path).resolve()
+                absolute = files.path(f"{cls.TABLE}.{name}.fmu", path).resolve()
                 entry["fmu"] = str(absolute)
                 # a missing file is reported when the scene is resolved
                 if entry.get("embed") is True and absolute.is_file():

@@ -22,7 +22,7 @@ class MissionKeys(SceneTable):
         """Store the content of the mission file."""
         if isinstance(file := unvalidated_value(tree, cls.TABLE, "mission"), str):
             key = f"{cls.TABLE}.mission"
-            tree[cls.TABLE]["mission_text"] = files.text(key, key, files.folder / file)
+            tree[cls.TABLE]["mission_text"] = files.text(key, key, files.path(key, file))
 
 
 def with_mission(scene: Scene, table: type[MissionKeys], config: ServiceConfig) -> ServiceConfig:

@@ -34,7 +34,8 @@ class FirmwareKeys(SceneTable):
     def embed_parameters(cls, tree: dict[str, Any], files: Files) -> None:
         """Store the content of a foreign firmware's parameter file."""
         if isinstance(file := unvalidated_value(tree, TABLE, "parameters"), str):
-            text = files.text("autopilot.parameters", "autopilot.parameters", files.folder / file)
+            key = f"{TABLE}.parameters"
+            text = files.text(key, key, files.path(key, file))
             tree[TABLE] |= {"parameters": {}, "parameter_text": text}
 
     def check_own(self) -> None:

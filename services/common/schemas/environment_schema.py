@@ -138,7 +138,7 @@ class EnvironmentTable(SceneTable):
             return
         if grid.heights is not None:
             raise ConfigError(key, "has file and heights", "one of them")
-        path, table = files.folder / grid.file, tree[cls.TABLE]["terrain"]["grid"]
+        path, table = files.path(f"{key}.file", grid.file), tree[cls.TABLE]["terrain"]["grid"]
         if path.suffix in height_file.GEOTIFF:
             points = _points(grid, key)
             heights = height_file.of_geotiff(f"{key}.file", path, environment_table.home, points, grid.spacing)

@@ -1,6 +1,7 @@
 """Scene tables of the vehicle, its airframe and its effects, and quantities derived from them."""
 
 from collections.abc import Mapping
+from functools import partial
 from typing import Any, ClassVar, NamedTuple
 
 from pydantic import ConfigDict, Field
@@ -110,7 +111,7 @@ class Effects(NamedTables):
         for name in set(entries).intersection(effects.names()) if isinstance(entries, dict) else ():
             if isinstance(entries[name], dict) and hasattr(module := effects.get(name), "embed"):
                 try:
-                    module.embed(entries[name], files.folder)
+                    module.embed(entries[name], partial(files.path, f"{cls.TABLE}.{name}.file"))
                 except ConfigError as error:
                     raise error.with_prefix(f"{cls.TABLE}.{name}") from None
 

@@ -2,6 +2,7 @@
 
 import math
 import pickle
+import re
 import shutil
 from pathlib import Path
 
@@ -229,3 +230,29 @@ def test_replaced_rejects_table_that_each_vehicle_has():
         fleet.replaced(fleet.vehicles[0][Vehicle])
     rates = fleet[Rates].model_copy(update={"estimate": 125})
     assert [scene[Rates].estimate for scene in fleet.replaced(rates).each_vehicle] == [125] * len(fleet.vehicles)
+
+
+def test_files_of_overrides_are_found_in_the_working_directory_before_the_scenes_folder(tmp_path, monkeypatch):
+    airframe = Path("lapwing/scenes/vehicles/delivery_drone.toml").read_text()
+    gains = Path("lapwing/services/autopilot/gains/tuned.toml").read_text()
+    scene, here = tmp_path / "scenes" / "own.toml", tmp_path / "here"
+    text = TEXT.replace('airframe = "delivery_drone"', 'airframe = "mine.toml"')
+    assert text != TEXT
+    for folder, total in ((scene.parent, 11.0), (here, 12.0)):
+        folder.mkdir()
+        (folder / "mine.toml").write_text(re.sub(r"(?m)^total = [\d.]+", f"total = {total}", airframe, count=1))
+    (here / "own_gains.toml").write_text(gains)
+    (here / "law.py").write_text("class Law:\n    rate = 250.0\n")
+    scene.write_text(text)
+    mass = "airframe.mass.total"
+    monkeypatch.chdir(here)
+    assert load(scene).lookup(mass) == 11.0
+    assert load(scene, ["vehicle.airframe=mine.toml"]).lookup(mass) == 12.0
+    assert load("hover", ["vehicle.airframe=mine.toml", "autopilot.gains=own_gains.toml"]).lookup(mass) == 12.0
+    assert load("hover", ["autopilot.controller=law:Law"]).sources["modules.law.py"]
+    fleet = load("fleet", ["vehicle.1.airframe=mine.toml"])
+    assert [member.lookup(mass) for member in fleet.vehicles].count(12.0) == 1
+    monkeypatch.chdir(tmp_path)
+    assert load(scene, ["vehicle.airframe=mine.toml"]).lookup(mass) == 11.0
+    with pytest.raises(SceneError, match="relative to the scene or the working directory"):
+        load(scene, ["vehicle.airframe=other.toml"])

@@ -21,7 +21,7 @@ GRID = "angle,J,CT,CP\n0,0,0.1,0.04\n0,0.2,0.08,0.038\n90,0,0.1,0.04\n90,0.2,0.1
 def make(drone, tmp_path, text=UIUC, **table):
     (tmp_path / "prop.csv").write_text(text)
     table = {"file": "prop.csv", **table}
-    embed(table, tmp_path)
+    embed(table, tmp_path.joinpath)
     (e,) = effects.from_scene({"rotor_table": table}, drone)
     return e
 
