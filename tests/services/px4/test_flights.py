@@ -48,7 +48,7 @@ def test_stopped_firmware_loses_no_step(tmp_path):
 def test_shell_is_that_of_the_firmware(tmp_path):
     program = "--set", f"autopilot.command={json.dumps([sys.executable, '-c', 'print(input()[::-1]); exit(3)'])}"
     log = "--log", tmp_path / "a.mcap"
-    done = lapwing("run", "px4_quad", "--shell", *program, *log, input="stats rev\n", code=1)
+    done = lapwing("run", "px4_quad", "--shell", *program, *log, stdin="stats rev\n", code=1)
     assert "ver stats" in done.stdout
     assert "px4: the program ended (exit code 3) at its start" in done.stderr
     assert "autopilot.shell" in lapwing("run", "px4_quad", "--shell", *log, code=2).stderr
