@@ -76,7 +76,7 @@ def test_campaign_with_two_workers_finds_free_ports_and_leaves_no_files(tmp_path
             "--set", "run.duration=2.0", "--set", "effects.body_drag.linear=[0,0,0]",
             "--vary", "effects.body_drag.linear.0=uniform(0,0.01)",
             *program(scripted("ardupilot", "--slow-exit", 0.5, "--starts", starts)),
-            env={**os.environ, "TMPDIR": str(temporary)},
+            TMPDIR=str(temporary),
         )  # fmt: skip
     started = [tuple(map(int, line.split())) for line in starts.read_text().splitlines()]
     assert len(started) == 6
