@@ -161,7 +161,7 @@ def logs(folder):
 
 
 def test_run_shows_outcome_command_and_report(studio, folder, flown):
-    assert "lapwing run hover --set run.seed=2" in flown[1]
+    assert "lapwing run hover --set trajectory.phase.0.z.to=1.5 --set run.seed=2 " in flown[1]
     assert "Change and run again" in flown[1]
     assert 'class="outcome' in flown[1]
     with LogReader(folder / "recordings" / logs(folder)[1]) as log:
