@@ -62,8 +62,7 @@ def _in_degrees(value: Any, location: Sequence[str | int], model: Any) -> Any:
             inner = value[first]
         except (KeyError, IndexError, TypeError):  # the name of a member of a union
             return value
-        converted = _in_degrees(inner, rest, follow(model, [first]))
-        return value if converted is inner else _replaced(value, [first], converted)
+        return _replaced(value, [first], _in_degrees(inner, rest, follow(model, [first])))
     base = str(first).removesuffix("_deg")
     if base == first or "deg" not in units.UNITS.get(_unit(model, [base]).strip(" []"), {}):
         return value
@@ -74,16 +73,20 @@ def _in_degrees(value: Any, location: Sequence[str | int], model: Any) -> Any:
     return {**{key: item for key, item in value.items() if key != first}, base: text}
 
 
-def _replaced(value: Any, location: Sequence[str | int], new: float) -> Any:
-    """Return a copy of plain data with another value at a location; the data itself if it has no such place."""
+def _replaced(value: Any, location: Sequence[str | int], new: Any) -> Any:
+    """Return plain data with another value at a location; the data itself if nothing changes: `validated` ends."""
     if not location:
         return new
     first, *rest = location
-    if isinstance(value, Mapping) and first in value:
-        return {**value, first: _replaced(value[first], rest, new)}
-    if isinstance(value, list | tuple) and isinstance(first, int) and first < len(value):
-        return type(value)(_replaced(item, rest, new) if i == first else item for i, item in enumerate(value))
-    return value
+    in_list = isinstance(value, list | tuple) and isinstance(first, int) and first < len(value)
+    if not in_list and not (isinstance(value, Mapping) and first in value):
+        return value
+    inner = _replaced(value[first], rest, new)
+    if inner is value[first]:
+        return value
+    if in_list:
+        return type(value)(inner if i == first else item for i, item in enumerate(value))
+    return {**value, first: inner}
 
 
 def fault(error: ValidationError, model: type) -> ConfigError:

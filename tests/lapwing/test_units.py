@@ -11,6 +11,7 @@ import pytest
 from lapwing.cosim.scene import SceneError
 from lapwing.dynamics import units
 from lapwing.dynamics.effects._from_scene import validate_table
+from lapwing.dynamics.validation import _replaced
 from lapwing.file_schemas.descriptions import effect_settings
 from lapwing.file_schemas.json_schema import SCHEMAS
 from lapwing.services.scene_resolver import from_resolved, load, resolve
@@ -131,3 +132,10 @@ def test_value_with_wrong_unit_is_rejected(key, value, message):
     with pytest.raises(SceneError) as error:
         load("hover", {key: value})
     assert message in str(error.value)
+
+
+def test_text_at_a_place_that_the_data_lacks_changes_nothing():
+    """Locations contain names of members of unions, and validation is repeated as long as the data change."""
+    data = {"a": [{"b": "3 m"}]}
+    assert _replaced(data, ("a", 0, "b"), 3.0) == {"a": [{"b": 3.0}]}
+    assert _replaced(data, ("a", 0, "Member", "b"), 3.0) is data
