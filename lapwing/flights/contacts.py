@@ -22,6 +22,7 @@ GROUND = "the ground"
 WALL, ROOF = "wall", "roof"
 PASSES = "passes"  # in place of the table of the effect `collision`, which may also be False: a hit does not count
 TOUCHING = 1e-6  # [m] distance that counts as none
+JOLT = 30.0  # [m/s^2] mean acceleration between two rows, above which the ground may have been touched meanwhile
 HARD = 2.0  # [m/s] speed at a touch above which it is a crash, for all airframes: a fall from 0.2 m
 MARGIN = 1.0  # [m] around an obstacle beyond which no distances are computed
 
@@ -77,6 +78,8 @@ def contacts(truth: TopicView, scene: Tables, others: Neighbours) -> list[Touch]
         return []
     ground, points = truth.ground_contact.astype(bool), _points(scene)
     on_obstacle, result = np.zeros(len(truth), bool), []
+    if "ground_contact" in _effects(scene):
+        ground |= _jolted_by_ground(truth, scene, points)
     for name, above, beyond in _obstacles(truth, scene, points) if "ground_contact" in _effects(scene) else ():
         distance = np.maximum(above, beyond).min(axis=1)
         touched = (distance <= TOUCHING) | _between_ticks(above, beyond)
@@ -201,6 +204,22 @@ def _between_ticks(above: np.ndarray, beyond: np.ndarray) -> np.ndarray:
     return np.concatenate([np.zeros(min(2, len(above)), bool), entered.any(axis=1)])
 
 
+def _jolted_by_ground(truth: TopicView, scene: Tables, points: np.ndarray) -> np.ndarray:
+    """Return True at rows before which a point has touched the ground for less than a tick, as a stiff foot does."""
+    result, relief = np.zeros(len(truth), bool), _relief(scene)
+    jolts = np.linalg.norm(np.diff(truth.velocity, axis=0), axis=1) > JOLT * np.diff(truth.times)
+    jolts &= ~(truth.ground_contact[1:] | truth.ground_contact[:-1])
+    for row in np.flatnonzero(jolts[1:]) + 2:
+        places = _places(truth, points, slice(row - 2, row))
+        above = places[..., 2] - np.array([[_ground_height(relief, *place) for place in places_] for places_ in places])
+        result[row] = (2.0 * above[1] - above[0] < 0.0).any()
+    return result
+
+
+def _ground_height(relief: Relief | None, x: float, y: float, z: float = 0.0) -> float:
+    return 0.0 if relief is None else float(python_function(field)(relief, float(x), float(y))[0])
+
+
 def _meets(gap: np.ndarray, reach: float) -> np.ndarray:
     """Return True where two spheres touch, or have touched since the row before."""
     met = gap <= reach
@@ -216,7 +235,7 @@ def lowest_point(truth: TopicView, scene: Tables) -> Callable[[int], float]:
         x, y, z = truth.position[row].tolist()
         if len(points):
             z = float(_places(truth, points, slice(row, row + 1))[..., 2].min())
-        return z - (0.0 if relief is None else float(python_function(field)(relief, x, y)[0]))
+        return z - _ground_height(relief, x, y)
 
     return height
 

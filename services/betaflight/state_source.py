@@ -12,7 +12,7 @@ from lapwing.services.common.firmware.link import Read
 
 STANDARD_PRESSURE = 101325.0  # [Pa] without a barometer
 AIR_WEIGHT = 12.0  # [N/m^3] change of pressure over height near the ground
-CURRENT = 0.3  # [s] age of a receiver's velocity that is used as it is
+CURRENT = 0.3  # [s] age of a receiver's velocity that is used as it is; an older one is integrated up to now
 HEIGHT_GAIN, SPEED_GAIN = 2.0, 2.0  # [1/s], [1/s^2] of the climb rate's observer
 _to_geodetic, _to_enu = python_function(enu_to_geodetic), python_function(geodetic_to_enu)
 _rotate, _conjugate = python_function(rotate), python_function(conjugate)
@@ -28,8 +28,10 @@ class StateSource:
         latitude, longitude, height = _to_geodetic(config.home, start_world)
         force = (0.0, 0.0, config.gravity)
         self.state = State(ZERO, force, NO_ROTATION, ZERO, latitude, longitude, height, STANDARD_PRESSURE)
-        self._position, self._velocity, self._fixed_at = start_world, (0.0, 0.0, 0.0), 0.0
-        self._climb_rate = self._climb = self._time = 0.0  # [m/s], [m], [s]
+        self._position, self._velocity, self._fixed_at = start_world, ZERO, 0.0
+        self._motion = Motion(start_world, ZERO, 0.0)
+        self._integrated = ZERO  # [m/s] velocity of the last fix and the acceleration since then
+        self._climb = self._time = 0.0  # [m], [s]
         self._start_pressure: float | None = None
 
     def update(self, time: float, read: Read) -> Motion:
@@ -44,6 +46,7 @@ class StateSource:
             state = state._replace(pressure=baro.pressure)
         if not s.gps:
             self._position, self._velocity, self._fixed_at = truth.position_world, truth.velocity_world, time
+            self._integrated = self._velocity
             latitude, longitude, height = _to_geodetic(s.home, truth.position_world)
             state = state._replace(
                 velocity_world=truth.velocity_world, latitude_deg=latitude, longitude_deg=longitude, height=height
@@ -52,31 +55,38 @@ class StateSource:
             self._gps = gps
             self._position = tuple(_to_enu(s.home, gps.latitude_deg, gps.longitude_deg, gps.height))
             self._velocity, self._fixed_at = gps.velocity_world, time - gps.age
+            self._integrated = self._velocity
             state = state._replace(
                 velocity_world=gps.velocity_world,
                 latitude_deg=gps.latitude_deg, longitude_deg=gps.longitude_deg, height=gps.height,
             )  # fmt: skip
         self.state = state
-        self._observe_climb(time)
-        elapsed = min(time - self._fixed_at, 1.0)
-        position = tuple(p + v * elapsed for p, v in zip(self._position, self._velocity, strict=True))
-        heading = _angles(state.attitude)[2]
-        return Motion(position, self._velocity, heading, time - self._fixed_at, self._climb_rate)  # type: ignore[arg-type]
+        self._integrate(time - self._time)
+        age, heading, climb_rate = time - self._fixed_at, _angles(state.attitude)[2], self._integrated[2]
+        if age < CURRENT:
+            self._motion = Motion(_moved(self._position, self._velocity, age), self._velocity, heading, age, climb_rate)
+        else:
+            position = _moved(self._motion.position_world, self._integrated, time - self._time)
+            self._motion = Motion(position, self._integrated, heading, age, climb_rate)
+        self._time = time
+        return self._motion
 
-    def _observe_climb(self, time: float) -> None:
-        """Integrate the vertical acceleration; barometer and receiver correct the climb rate."""
-        s, elapsed = self._config, time - self._time
-        acceleration = _rotate(self.state.attitude, self.state.specific_force_body)[2] - s.gravity
+    def _integrate(self, elapsed: float) -> None:
+        """Add the acceleration of the last `elapsed` seconds to the velocity; the barometer corrects the climb rate."""
+        s = self._config
+        ax, ay, az = _rotate(self.state.attitude, self.state.specific_force_body)
         error = 0.0
         if s.barometer:
             if self._start_pressure is None and self.state.pressure != STANDARD_PRESSURE:
                 self._start_pressure = self.state.pressure
             error = ((self._start_pressure or self.state.pressure) - self.state.pressure) / AIR_WEIGHT - self._climb
-        self._climb_rate += elapsed * (acceleration + SPEED_GAIN * error)
-        self._climb += elapsed * (self._climb_rate + HEIGHT_GAIN * error)
-        if time - self._fixed_at < CURRENT:
-            self._climb_rate = self._velocity[2]
-        self._time = time
+        self._integrated = _moved(self._integrated, (ax, ay, az - s.gravity + SPEED_GAIN * error), elapsed)
+        self._climb += elapsed * (self._integrated[2] + HEIGHT_GAIN * error)
+
+
+def _moved(start: Vec3, rate: Vec3, elapsed: float) -> Vec3:
+    x, y, z = (a + b * elapsed for a, b in zip(start, rate, strict=True))
+    return x, y, z
 
 
 def _specific_force(truth: ports.TrueState, gravity: float) -> Vec3:

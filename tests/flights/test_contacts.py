@@ -73,6 +73,16 @@ def test_contact_that_no_obstacle_explains_is_that_of_the_ground():
     assert touch == ("the ground", "", 2.0, 0.5, 0.0)
 
 
+@pytest.mark.parametrize("slope", [0.0, 0.1])
+def test_foot_that_bounces_between_two_ticks_touches_the_ground(slope):
+    """A stiff foot stays on the ground for less than a tick, so that the log has no contact."""
+    terrain = {key: value for key, value in TERRAIN.items() if key != "steps"} | {"slope": (slope, 0.0)}
+    scene = SCENE | {"environment": {"terrain": terrain}}
+    path = 0.202 + slope * 2.1 + 0.6 * abs(T - 2.0)  # the foot ahead turns 2 mm above the ground
+    assert touches(2.0, y=-3.0, z=path, scene=scene) == [("the ground", "", pytest.approx(2.01), 0.6, 0.0)]
+    assert touches(2.0, y=-3.0, z=path + 0.01, scene=scene) == []
+
+
 def test_obstacles_without_contact_model_are_no_bodies():
     assert touches(approach(6.0), scene=SCENE | {"effects": {}}) == []
 

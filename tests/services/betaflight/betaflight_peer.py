@@ -100,7 +100,7 @@ class Peer:
 
     def _run(self):
         while not self._ending:
-            sources = [self._state, self._rc, self._server, *self._clients]
+            sources = [self._rc, self._state, self._server, *self._clients]  # RC first, as it was sent
             for each in select.select(sources, [], [], 0.05)[0]:
                 if each is self._server:
                     self._clients.append(self._server.accept()[0])
