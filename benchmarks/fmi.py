@@ -48,7 +48,7 @@ def best(function: Callable[[], float]) -> float:
 
 def in_the_air(diagram: BlockDiagram) -> None:
     """Move the vehicle to its start height."""
-    blocks = zip(diagram._parts, diagram._codes, strict=True)
+    blocks = zip(diagram._blocks, diagram._codes, strict=True)
     image = image_of([(part.name, bound.cell) for part, bound in blocks if bound], diagram._rows)
     (leaf,) = (leaf for leaf in image.leaves if leaf.path == "plant|state.vehicle.motion.position_world[2]")
     (region,) = (r for r in image.regions if r.offset <= leaf.offset < r.offset + r.size)

@@ -22,8 +22,8 @@ class ProcessEntry(NamedTuple):
     """Process of a run."""
 
     name: str
-    lock_step: bool  # part of the lock step; required if the run configuration has it
-    resolves: bool = False  # has a `resolve.py` although it is not part of the lock step
+    lock_step: bool  # block of the lock step; required if the run configuration has it
+    resolves: bool = False  # has a `resolve.py` although it is not block of the lock step
     optional: bool = False  # started only if its option is given; the run continues without it
     mode: str = "peer"  # mode of its Zenoh session
     foreign: bool = False  # flies a foreign firmware instead of the autopilot
@@ -187,7 +187,7 @@ def create(
         own_ports = {port.name for port in member.services[name].ports}
         replaced = {a: b for a, b in replaced_ports(fmus_of(member.services)).items() if a not in own_ports}
         if replaced and entry(name).name != FMU:
-            service.parts = rewire(service.parts, replaced)
+            service.blocks = rewire(service.blocks, replaced)
         return service
 
     if config.vehicle:

@@ -123,9 +123,9 @@ def draw(path: Path) -> None:
     figure, axes = plt.subplots(figsize=(12.0, 8.2))
     for number, service in enumerate(create_all(config), 1):
         lines = []
-        for part in service.parts:
-            name = part.name.removeprefix(f"{service.name}.")
-            python = not isinstance(part, Block)
+        for block in service.blocks:
+            name = block.name.removeprefix(f"{service.name}.")
+            python = not isinstance(block, Block)
             lines.append((f"{name} (Python)", ORANGE) if python else (name, DARK))
         process(axes, SERVICES[service.name], f"{number}  {service.name}", lines if len(lines) > 1 else [])
     options = {"recorder": "log.mcap", "router": "--listen: topics for clients", "mavlink": "--mavlink"}

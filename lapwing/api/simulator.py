@@ -160,7 +160,9 @@ class Simulator:
         command_block = ExternalBlock(
             "simulator.given", Port(ORDER, ControllerInput(), LATCHED), Port(NO_TRAJECTORY, Setpoint(), LATCHED)
         )
-        autopilot.parts = [command_block if part.name == "autopilot.commander" else part for part in autopilot.parts]
+        autopilot.blocks = [
+            command_block if block.name == "autopilot.commander" else block for block in autopilot.blocks
+        ]
         if ports.TRAJECTORY in config.ports:
             services.append(
                 Service("trajectory", [ExternalBlock("simulator.given", config.port(ports.TRAJECTORY))], [])

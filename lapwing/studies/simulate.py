@@ -87,7 +87,7 @@ def _fly(
         if (encoder.topic.recorded if only is None else template_topic(encoder.topic) in only)
     }
     if every_port:
-        selected = {port.name for service in services for part in service.parts for port in part.outputs}
+        selected = {port.name for service in services for block in service.blocks for port in block.outputs}
     diagram, failure, diverged = BlockDiagram(config, services, KEPT_TICKS, selected, rows), "", False
     try:
         look = config.last_tick + 1 if observe is None else LOOK

@@ -84,7 +84,7 @@ def create(config: RunConfig, operator: Operator = lambda tick: ()) -> Service:
     else:
         control = controller_blocks(f"{NAME}.control", config.modules, settings, common, inputs, control_outputs)
     navigation = _navigation(config, settings, wakeup, outputs[ports.ESTIMATE], injection)
-    service.parts = [
+    service.blocks = [
         *injection.before(NAME),
         *navigation,
         commander,
@@ -133,12 +133,12 @@ def _navigation(
     over_ground = GroundReference(p._replace(sonar_height_max=math.inf))
     known_ports = config.ports
     inertial = InertialNavigation(p, settings.start_world, STANDSTILL_EVERY * settings.imu_every)
-    imu, parts = injection.received(ports.IMU), []
+    imu, blocks = injection.received(ports.IMU), []
     if settings.imus > 1:
         imu = "imu.selected"
-        parts = _vote(settings, p, state, known_ports[ports.IMU]._replace(name=imu), injection)
+        blocks = _vote(settings, p, state, known_ports[ports.IMU]._replace(name=imu), injection)
     inputs = (InputPort(imu), InputPort(injection.received(ports.MAGNETOMETER)), flight)
-    parts += [Block(f"{NAME}.inertial", inertial, state, inputs, (), settings.imu_every)]
+    blocks += [Block(f"{NAME}.inertial", inertial, state, inputs, (), settings.imu_every)]
     for port, fusion in (
         (ports.MAGNETOMETER, Correction(p)),
         (ports.BAROMETER, Correction(p)),
@@ -148,12 +148,12 @@ def _navigation(
     ):
         if port in known_ports:
             reading = InputPort(injection.received(port))
-            parts.append(Block(f"{NAME}.{port}", fusion, state, (reading,), (), known_ports[port].period))
+            blocks.append(Block(f"{NAME}.{port}", fusion, state, (reading,), (), known_ports[port].period))
     before_start = StateEstimate(position_world=settings.start_world, health=NOT_STARTED)
     estimate_block = FilterEstimate(p, wakeup, before_start)
-    parts.append(Block(f"{NAME}.estimate", estimate_block, state, (battery, flight), (estimate,)))
+    blocks.append(Block(f"{NAME}.estimate", estimate_block, state, (battery, flight), (estimate,)))
     if ports.ESTIMATE_COVARIANCE in known_ports:  # not in logs of former versions
         covariance_port = known_ports[ports.ESTIMATE_COVARIANCE]
         output = CovarianceOutput(EstimateCovariance())
-        parts.append(Block(f"{NAME}.covariance", output, state, (), (covariance_port,), covariance_port.period))
-    return parts
+        blocks.append(Block(f"{NAME}.covariance", output, state, (), (covariance_port,), covariance_port.period))
+    return blocks

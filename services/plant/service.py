@@ -36,7 +36,7 @@ def create(config: RunConfig) -> Service:
     feet = tuple(port for port in settings.ports if port.name == ports.CONTACT)
     truth_ports = tuple(port for port in settings.ports if port not in bodies and port not in feet)
     has_own_bodies = plant.model == "cooperative_load"  # the plant's block outputs the bodies
-    part = Block(
+    block = Block(
         NAME,
         plant.core,
         state,
@@ -44,21 +44,21 @@ def create(config: RunConfig) -> Service:
         settings.ports if has_own_bodies else truth_ports,
         failure=_divergence_error(config, plant, state),
     )
-    parts: list[Any] = [part]
+    blocks: list[Any] = [block]
     if plant.events:
-        parts.insert(0, PropellerFailures(plant))
+        blocks.insert(0, PropellerFailures(plant))
     if plant.others:
-        parts = _with_neighbours(plant, plant.others, parts, state, bodies)
+        blocks = _with_neighbours(plant, plant.others, blocks, state, bodies)
     if bodies and plant.bodies and not has_own_bodies:
         inputs = settings.inputs[:1]
-        parts.append(Block(f"{NAME}.bodies", plant.bodies, state, inputs, tuple(bodies), bodies[0].period))
+        blocks.append(Block(f"{NAME}.bodies", plant.bodies, state, inputs, tuple(bodies), bodies[0].period))
     if plant.contact:
-        parts.append(Block(f"{NAME}.contact", plant.contact, state, (InputPort(ports.TRUTH),), feet, feet[0].period))
-    return Service(NAME, parts, topic_encoders(config, plant.encoding))
+        blocks.append(Block(f"{NAME}.contact", plant.contact, state, (InputPort(ports.TRUTH),), feet, feet[0].period))
+    return Service(NAME, blocks, topic_encoders(config, plant.encoding))
 
 
 def _with_neighbours(
-    plant: PlantConfig, others: FleetCoupling, parts: list[Any], state: Cell, bodies: list[Port]
+    plant: PlantConfig, others: FleetCoupling, blocks: list[Any], state: Cell, bodies: list[Port]
 ) -> list[Any]:
     """Return the plant's blocks between the effects of its neighbours and its own neighbour state."""
     vehicle, interval = plant.core.vehicle, plant.core.interval
@@ -66,7 +66,7 @@ def _with_neighbours(
     view = NeighbourStateOutput(vehicle, others.presence, interval)
     result = [
         Block(f"{NAME}.interaction", interaction, state, _delayed_inputs(PRESENCE, *others.ports)),
-        *parts,
+        *blocks,
         Block(f"{NAME}.{PRESENCE}", view, state, (InputPort(ports.TRUTH),), (Port(PRESENCE, others.presence),)),
     ]
     if others.load:
@@ -128,8 +128,8 @@ class PropellerFailures:
             self.replacements[tick + 1] = [self._prepare(NAME, failing), self._prepare(f"{NAME}.bodies", view)]
 
     def _prepare(self, name: str, parameters: Any) -> tuple[Block, BoundBlock]:
-        part = replace(self._diagram.part(name), parameters=parameters)
-        return part, self._diagram.prepare(part)
+        block = replace(self._diagram.block(name), parameters=parameters)
+        return block, self._diagram.prepare(block)
 
     def on_tick(self, tick: int) -> int:
         """Replace the plant of the step to `tick` by one with failures, and that of the step after it by one without.

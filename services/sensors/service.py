@@ -19,15 +19,15 @@ def create(config: RunConfig) -> Service:
     """Return the sensors of a run, whose parameters are its instruments in the order of their ports."""
     settings = config.services[NAME]
     instruments: tuple[Instrument, ...] = settings.parameters
-    parts: list[Block] = []
+    blocks: list[Block] = []
     encoders: list[TopicEncoder] = []
     for p, port in zip(instruments, settings.ports, strict=True):
         module, inputs = sys.modules[type(p.sensor).__module__], settings.inputs[: 1 + len(p.others)]
-        parts.append(Block(f"{NAME}.{port.name}", p, Cell(module.blank()), inputs, (port,), port.period))
+        blocks.append(Block(f"{NAME}.{port.name}", p, Cell(module.blank()), inputs, (port,), port.period))
         if port.name not in PORTS:
             built_in = module.__package__ == __package__ and port.name not in ports.IMUS
             encoders += (
                 module.topic_encoders(config.vehicle, port, p) if built_in else [reading_encoder(config.vehicle, port)]
             )
     sensors = {port.name: p.sensor for p, port in zip(instruments, settings.ports, strict=True)}
-    return Service(NAME, parts, encoders + topic_encoders(config, sensors))
+    return Service(NAME, blocks, encoders + topic_encoders(config, sensors))

@@ -27,5 +27,5 @@ class TrajectoryConfig(NamedTuple):
 def create(config: RunConfig) -> Service:
     """Return the trajectory service of a run."""
     settings: Any = config.services[NAME]
-    part = Block(NAME, settings.parameters.core, Cell(0.0), settings.inputs, settings.ports)
-    return Service(NAME, [part], [setpoint_encoder(TRAJECTORY, ports.TRAJECTORY, settings.parameters.phases)])
+    block = Block(NAME, settings.parameters.core, Cell(0.0), settings.inputs, settings.ports)
+    return Service(NAME, [block], [setpoint_encoder(TRAJECTORY, ports.TRAJECTORY, settings.parameters.phases)])

@@ -10,9 +10,9 @@ from numba.core.runtime import _nrt_python, rtsys
 from lapwing.cosim.diagram.compiled_block import Block, advance
 from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.kernels.cell import Cell, read
-from tests.cosim.parts.arrays import Last, Mean, Sum, weighted
-from tests.cosim.parts.exchanged_array import Exchange
-from tests.cosim.parts.new_arrays import Squares
+from tests.cosim.blocks.arrays import Last, Mean, Sum, weighted
+from tests.cosim.blocks.exchanged_array import Exchange
+from tests.cosim.blocks.new_arrays import Squares
 from tests.cosim.small_graph import graph_of
 
 TICKS = 1000

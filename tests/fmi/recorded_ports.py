@@ -49,8 +49,8 @@ class DrivenService(RecordedPorts):
     def __init__(self, config: RunConfig, name: str):
         self.config, rng = config, random.Random(1)
         service = create(config, name)
-        own = {port.name for part in service.parts for port in part.outputs}
-        read = {i.port for part in service.parts for i in part.inputs} - own
+        own = {port.name for block in service.blocks for port in block.outputs}
+        read = {i.port for block in service.blocks for i in block.inputs} - own
         self.diagram = BlockDiagram(config, [service], 1, whole=own | read)
         for tick in range(config.last_tick + 1):
             for port in sorted(read):

@@ -37,7 +37,7 @@ class Service:
     """
 
     name: str
-    parts: Sequence[Any]
+    blocks: Sequence[Any]
     encoders: Sequence[TopicEncoder]
     messages: list[tuple[Topic, int, bytes]] = field(default_factory=list)  # (topic, tick, payload) not yet fetched
     python_topics: Sequence[Topic] = ()  # the topics of `messages`
@@ -62,9 +62,9 @@ class ExternalBlock:
         return NEVER
 
 
-def is_connected(part: Any) -> bool:
+def is_connected(block: Any) -> bool:
     """Return True if a block has a connection to a program outside the run: its class has `reports`."""
-    return hasattr(type(part), "reports")  # of a block, an error in that property would count as its absence
+    return hasattr(type(block), "reports")  # of a block, an error in that property would count as its absence
 
 
 class BlockDiagram(PortRows):
@@ -95,18 +95,18 @@ class BlockDiagram(PortRows):
         """
         self.config, self.services = config, services
         self.tick, self.ended = 0, False
-        parts = [part for service in services for part in service.parts]
+        blocks = [block for service in services for block in service.blocks]
         ports = dict(config.ports)
-        for part in parts:
-            ports |= {port.name: port for port in part.outputs}
-        port_names = {port.name for part in parts for port in part.outputs}
-        port_names |= {i.port for part in parts for i in getattr(part, "inputs", ())}
+        for block in blocks:
+            ports |= {port.name: port for port in block.outputs}
+        port_names = {port.name for block in blocks for port in block.outputs}
+        port_names |= {i.port for block in blocks for i in getattr(block, "inputs", ())}
         unknown = sorted(port_names - ports.keys())
         if unknown:
             raise LockStepError(f"no service of this scene publishes {', '.join(unknown)}")
         delays: dict[str, int] = {}
-        for part in parts:
-            for i in getattr(part, "inputs", ()):
+        for block in blocks:
+            for i in getattr(block, "inputs", ()):
                 delays[i.port] = max(delays.get(i.port, 0), i.delay)
         for encoder in (encoder for service in services for encoder in service.encoders if encoder.on_change):
             delays[encoder.port] = max(delays.get(encoder.port, 0), 1)
@@ -114,47 +114,47 @@ class BlockDiagram(PortRows):
             name: config.last_tick + 1 if name in whole else kept_ticks + delays.get(name, 0) for name in port_names
         }
         super().__init__(ports, depths, delays, rows)
-        self._parts = parts
+        self._blocks = blocks
         self._codes: list[BoundBlock | None] = []
-        for part in parts:
-            self._codes.append(bind(part, self.ports, self._rows) if isinstance(part, Block) else None)
-        self._groups = [ExecutionGroup(numbers, parts, self._codes) for numbers in independent_groups(parts)]
-        for part in parts:
-            if not isinstance(part, Block):
-                part.bind(self)
+        for block in blocks:
+            self._codes.append(bind(block, self.ports, self._rows) if isinstance(block, Block) else None)
+        self._groups = [ExecutionGroup(numbers, blocks, self._codes) for numbers in independent_groups(blocks)]
+        for block in blocks:
+            if not isinstance(block, Block):
+                block.bind(self)
 
     @property
     def _connected(self) -> list[Any]:
-        return [part for part in self._parts if is_connected(part)]
+        return [block for block in self._blocks if is_connected(block)]
 
     def open(self, report_wait: Callable[[str], None] = lambda text: None, log: Path | None = None) -> None:
         """Connect the blocks to their programs outside the run. `report_wait` receives a text for each wait."""
-        for part in self._connected:
-            part.open(report_wait, log)
+        for block in self._connected:
+            block.open(report_wait, log)
 
     def close(self) -> None:
         """Close the connections to programs outside the run."""
-        for part in self._connected:
-            part.close()
+        for block in self._connected:
+            block.close()
 
     @property
     def reports(self) -> dict[str, str]:
         """Entries for the log's metadata from the blocks with a connection to a program outside the run."""
-        return {key: text for part in self._connected for key, text in part.reports.items()}
+        return {key: text for block in self._connected for key, text in block.reports.items()}
 
-    def part(self, name: str) -> Block:
+    def block(self, name: str) -> Block:
         """Return the compiled block of this name."""
-        return next(part for part in self._parts if part.name == name)
+        return next(block for block in self._blocks if block.name == name)
 
-    def prepare(self, part: Block) -> BoundBlock:
+    def prepare(self, block: Block) -> BoundBlock:
         """Compile or load a block that replaces another one later."""
-        return bind(part, self.ports, self._rows)
+        return bind(block, self.ports, self._rows)
 
-    def replace(self, part: Block, code: BoundBlock) -> None:
+    def replace(self, block: Block, code: BoundBlock) -> None:
         """Replace the block of the same name by a prepared one, which continues from the state in its own cell."""
-        k = self._parts.index(self.part(part.name))
-        self._parts[k], self._codes[k] = part, code
-        next(group for group in self._groups if k in group.parts).replace(k, code)
+        k = self._blocks.index(self.block(block.name))
+        self._blocks[k], self._codes[k] = block, code
+        next(group for group in self._groups if k in group.blocks).replace(k, code)
 
     def advance(self, stop: int, on_tick: Callable[[Any, int], int] | None = None) -> None:
         """Run to the tick `stop` (exclusive), or to the end of the run.
@@ -170,10 +170,10 @@ class BlockDiagram(PortRows):
         if self.ended:
             return
 
-        def act(part: int, tick: int) -> int:
+        def act(number: int, tick: int) -> int:
             self._set_tick(tick)
-            block = self._parts[part]
-            return block.on_tick(tick) if on_tick is None else on_tick(block, tick)
+            python = self._blocks[number]
+            return python.on_tick(tick) if on_tick is None else on_tick(python, tick)
 
         stop, self.ended, failed = advance_groups(self._groups, stop, act, self._failure)
         self.tick = max(self.tick, stop)
@@ -183,9 +183,9 @@ class BlockDiagram(PortRows):
         if failed is not None:
             raise failed
 
-    def _failure(self, part: int, tick: int) -> Exception:
+    def _failure(self, number: int, tick: int) -> Exception:
         self._set_tick(tick)
-        return (self._parts[part].failure or _divergence_error(self._parts[part].name))(tick)
+        return (self._blocks[number].failure or _divergence_error(self._blocks[number].name))(tick)
 
     def _set_tick(self, tick: int) -> None:
         if len(self._groups) == 1:

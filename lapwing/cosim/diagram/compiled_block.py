@@ -96,18 +96,18 @@ class BoundBlock(NamedTuple):
     cell: Any  # owner of the memory; it must live as long as the code is called
 
 
-def bind(part: Block, ports: dict[str, Port], rows: dict[str, np.ndarray]) -> BoundBlock:
+def bind(block: Block, ports: dict[str, Port], rows: dict[str, np.ndarray]) -> BoundBlock:
     """Compile or load a block, and bind it to the rows of its ports.
 
     Args:
-        part: block.
+        block: block.
         ports: ports by name.
         rows: ring buffer of each port by name, shape (2^k, width).
     """
-    inputs = tuple(InputRing(ports[i.port].example, rows[i.port], ports[i.port].period, i.delay) for i in part.inputs)
-    outputs = tuple(OutputRing(rows[port.name], port.period) for port in part.outputs)
-    cell = Cell(BlockData(part.parameters, part.state, inputs, outputs))
-    return BoundBlock(_address(numba.typeof(cell), part.trusted), cell.memory.pointer, cell)
+    inputs = tuple(InputRing(ports[i.port].example, rows[i.port], ports[i.port].period, i.delay) for i in block.inputs)
+    outputs = tuple(OutputRing(rows[port.name], port.period) for port in block.outputs)
+    cell = Cell(BlockData(block.parameters, block.state, inputs, outputs))
+    return BoundBlock(_address(numba.typeof(cell), block.trusted), cell.memory.pointer, cell)
 
 
 @cache

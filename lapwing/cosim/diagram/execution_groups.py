@@ -15,16 +15,16 @@ from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels.cell import Cell
 
 
-def independent_groups(parts: Sequence[Any]) -> list[list[int]]:
+def independent_groups(blocks: Sequence[Any]) -> list[list[int]]:
     """Return the numbers of the blocks of each group.
 
     A vehicle is a group, unless a block reads a port of another vehicle or an external port: then all form one group.
     """
-    vehicles = [getattr(part, "vehicle", "") for part in parts]
-    producer = {port.name: vehicle for part, vehicle in zip(parts, vehicles, strict=True) for port in part.outputs}
-    for part, vehicle in zip(parts, vehicles, strict=True):
-        if any(producer.get(i.port) != vehicle for i in getattr(part, "inputs", ())):
-            return [list(range(len(parts)))]
+    vehicles = [getattr(block, "vehicle", "") for block in blocks]
+    producer = {port.name: vehicle for block, vehicle in zip(blocks, vehicles, strict=True) for port in block.outputs}
+    for block, vehicle in zip(blocks, vehicles, strict=True):
+        if any(producer.get(i.port) != vehicle for i in getattr(block, "inputs", ())):
+            return [list(range(len(blocks)))]
     return [[k for k, other in enumerate(vehicles) if other == vehicle] for vehicle in dict.fromkeys(vehicles)]
 
 
@@ -32,17 +32,20 @@ class ExecutionGroup:
     """Blocks that step together.
 
     Attributes:
-        parts: numbers of the blocks in the diagram, in order.
+        blocks: numbers of the blocks in the diagram, in order.
         tick: next tick.
         finished: True if the previous tick was their last.
     """
 
-    def __init__(self, numbers: Sequence[int], parts: Sequence[Any], codes: Sequence[BoundBlock | None]):
+    def __init__(self, numbers: Sequence[int], blocks: Sequence[Any], codes: Sequence[BoundBlock | None]):
         """Select the blocks `numbers` of a diagram, with their compiled code (None for Python blocks)."""
-        self.parts, self.tick, self.finished = list(numbers), 0, False
-        own = [parts[k] for k in numbers]
-        every, vehicles = [getattr(part, "every", 1) for part in own], [getattr(part, "vehicle", "") for part in own]
-        plan = schedule([codes[k] for k in numbers], every, vehicles, [part.name for part in own])
+        self.blocks, self.tick, self.finished = list(numbers), 0, False
+        own = [blocks[k] for k in numbers]
+        every, vehicles = (
+            [getattr(block, "every", 1) for block in own],
+            [getattr(block, "vehicle", "") for block in own],
+        )
+        plan = schedule([codes[k] for k in numbers], every, vehicles, [block.name for block in own])
         self._plan = plan._replace(done=np.append(plan.done, 1))  # the last entry: 1 if the group may end
         self._cell = Cell(self._plan)  # shares the arrays; a cell is a faster argument
 
@@ -62,10 +65,10 @@ class ExecutionGroup:
             while not self.finished:
                 self.tick, k, status = run(self._cell, self.tick, k, stop)
                 if status == WAKE_PYTHON:
-                    self._plan.next[k] = max(on_tick(self.parts[k], self.tick), self.tick + 1)
+                    self._plan.next[k] = max(on_tick(self.blocks[k], self.tick), self.tick + 1)
                     k += 1
                 elif status == NON_FINITE:
-                    raise failure(self.parts[k], self.tick)
+                    raise failure(self.blocks[k], self.tick)
                 else:
                     self.finished = status == FINISHED
                     if status == CONTINUE:
@@ -82,9 +85,9 @@ class ExecutionGroup:
         self.advance(stop, on_tick, failure)
         self.finished = True
 
-    def replace(self, part: int, code: BoundBlock) -> None:
-        """Replace the machine code of the block `part`."""
-        k = self.parts.index(part)
+    def replace(self, number: int, code: BoundBlock) -> None:
+        """Replace the machine code of a block of the diagram."""
+        k = self.blocks.index(number)
         self._plan.function[k], self._plan.memory[k] = code.function, code.memory
 
 

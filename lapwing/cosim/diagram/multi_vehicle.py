@@ -90,11 +90,11 @@ def primary_topic(config: RunConfig, topic: Topic) -> Topic:
 def merge_services(name: str, services: Sequence[tuple[RunConfig, Service]]) -> Service:
     """Return a service with the blocks of all vehicles; `services` has the configuration and service of each."""
     fleet = Service(name, [], [])
-    parts, encoders, python_topics = [], [], []
+    blocks, encoders, python_topics = [], [], []
     clocks = 0
     for member, service in services:
         vehicle = member.vehicle
-        parts += [_part(member, part) for part in service.parts]
+        blocks += [_block(member, block) for block in service.blocks]
         for encoder in service.encoders:
             clocks += encoder.topic is CLOCK
             if encoder.topic is not CLOCK or clocks == 1:  # the clocks of all vehicles are equal
@@ -102,7 +102,7 @@ def merge_services(name: str, services: Sequence[tuple[RunConfig, Service]]) -> 
                 encoders.append(replace(encoder, topic=topic, port=port))
         service.messages = _Outbox(fleet, vehicle)
         python_topics += [of_vehicle(topic, vehicle) for topic in service.python_topics]
-    fleet.parts, fleet.encoders, fleet.python_topics = parts, encoders, python_topics
+    fleet.blocks, fleet.encoders, fleet.python_topics = blocks, encoders, python_topics
     return fleet
 
 
@@ -126,16 +126,16 @@ def _port(vehicle: str, port: Port) -> Port:
     return port._replace(name=qualified_name(vehicle, port.name))
 
 
-def _part(member: RunConfig, part: Any) -> Any:
+def _block(member: RunConfig, block: Any) -> Any:
     vehicle = member.vehicle
-    if not isinstance(part, Block):
-        return (ConnectedVehicleBlock if is_connected(part) else VehicleBlock)(member, part)
+    if not isinstance(block, Block):
+        return (ConnectedVehicleBlock if is_connected(block) else VehicleBlock)(member, block)
     return replace(
-        part,
-        name=qualified_name(vehicle, part.name),
-        inputs=tuple(_input(vehicle, i) for i in part.inputs),
-        outputs=tuple(_port(vehicle, port) for port in part.outputs),
-        failure=part.failure and partial(_failure, vehicle, part.failure),
+        block,
+        name=qualified_name(vehicle, block.name),
+        inputs=tuple(_input(vehicle, i) for i in block.inputs),
+        outputs=tuple(_port(vehicle, port) for port in block.outputs),
+        failure=block.failure and partial(_failure, vehicle, block.failure),
         vehicle=vehicle,
     )
 
@@ -148,25 +148,25 @@ def _failure(vehicle: str, failure: Callable[[int], Exception], tick: int) -> Ex
 class VehicleBlock:
     """Python block of a vehicle in a fleet."""
 
-    def __init__(self, member: RunConfig, part: Any):
+    def __init__(self, member: RunConfig, block: Any):
         """Wrap a Python block of the vehicle with the run configuration `member`."""
-        self._member, self._part = member, part
+        self._member, self._block = member, block
         self.vehicle = member.vehicle
-        self.name = qualified_name(self.vehicle, part.name)
-        self.outputs = tuple(_port(self.vehicle, port) for port in part.outputs)
-        self.inputs = tuple(_input(self.vehicle, i) for i in getattr(part, "inputs", ()))
+        self.name = qualified_name(self.vehicle, block.name)
+        self.outputs = tuple(_port(self.vehicle, port) for port in block.outputs)
+        self.inputs = tuple(_input(self.vehicle, i) for i in getattr(block, "inputs", ()))
 
     def bind(self, diagram: BlockDiagram) -> None:
         """Bind the block to the vehicle's view of the diagram."""
-        self._part.bind(VehicleDiagram(diagram, self._member))
+        self._block.bind(VehicleDiagram(diagram, self._member))
 
     def on_tick(self, tick: int) -> int:
         """Run the block at `tick`."""
-        return self._part.on_tick(tick)
+        return self._block.on_tick(tick)
 
     def failure(self, tick: int) -> Exception:
         """Return the error of the block's compiled code at `tick`."""
-        return _failure(self.vehicle, self._part.failure, tick)
+        return _failure(self.vehicle, self._block.failure, tick)
 
 
 class ConnectedVehicleBlock(VehicleBlock):
@@ -174,16 +174,16 @@ class ConnectedVehicleBlock(VehicleBlock):
 
     def open(self, report_wait: Callable[[str], None], log: Path | None = None) -> None:
         """Connect; files of the program have the name of the vehicle."""
-        self._part.open(report_wait, log and log.with_suffix(f".{self.vehicle}.mcap"))
+        self._block.open(report_wait, log and log.with_suffix(f".{self.vehicle}.mcap"))
 
     def close(self) -> None:
         """End the connection."""
-        self._part.close()
+        self._block.close()
 
     @property
     def reports(self) -> dict[str, str]:
         """Entries of the log's metadata, by vehicle."""
-        return {f"{self.vehicle}/{key}": text for key, text in self._part.reports.items()}
+        return {f"{self.vehicle}/{key}": text for key, text in self._block.reports.items()}
 
 
 class VehicleDiagram(RenamedPortRows):
@@ -193,14 +193,14 @@ class VehicleDiagram(RenamedPortRows):
         super().__init__(diagram, partial(qualified_name, member.vehicle))
         self._diagram, self.config = diagram, member
 
-    def part(self, name: str) -> Block:
+    def block(self, name: str) -> Block:
         """Return the compiled block of this name."""
-        return self._diagram.part(qualified_name(self.config.vehicle, name))
+        return self._diagram.block(qualified_name(self.config.vehicle, name))
 
-    def prepare(self, part: Block) -> BoundBlock:
+    def prepare(self, block: Block) -> BoundBlock:
         """Compile or load a block that replaces another one later."""
-        return self._diagram.prepare(part)
+        return self._diagram.prepare(block)
 
-    def replace(self, part: Block, code: BoundBlock) -> None:
+    def replace(self, block: Block, code: BoundBlock) -> None:
         """Replace the block of the same name by a prepared one."""
-        self._diagram.replace(part, code)
+        self._diagram.replace(block, code)

@@ -34,9 +34,9 @@ class StepDoubling(NamedTuple):
 
 
 @always_inline
-def shorter(part, error, tolerance):
+def shorter(substep, error, tolerance):
     """Return the next substep after one with too large an error (theory, eq. (2.33))."""
-    return part * min(max(0.1, 0.7 * math.sqrt(tolerance / error)), 0.3)
+    return substep * min(max(0.1, 0.7 * math.sqrt(tolerance / error)), 0.3)
 
 
 @generic(inline=True)
@@ -57,8 +57,8 @@ def _once(method, p, t, x, h):
 def integrate_step_doubling(how, p, t, x, h, end):
     """Return the state at time `end` by step doubling; the result of the halves is kept, none longer than h."""
     while True:
-        part, until = piece(p, t, end)
-        x = _smooth(how, part, t, x, h, until)
+        smooth, until = piece(p, t, end)
+        x = _smooth(how, smooth, t, x, h, until)
         if not until < end:
             return x
         t = until
@@ -68,25 +68,25 @@ def integrate_step_doubling(how, p, t, x, h, end):
 def _smooth(how, p, start, x, h, end):
     # Sums of states are compensated, and time counts from the start: at a jump of a force the shortest substeps
     # change a slow state by less than a unit in the last place, and would never leave the jump.
-    allowed, part = how.tolerance, 2.0 * h
+    allowed, substep = how.tolerance, 2.0 * h
     smallest = SHORTEST * allowed
     x, t, duration = exact(CompensatedSummation(), how.method, x), 0.0, end - start
     while True:
         left = duration - t
-        part = min(part, 2.0 * h)
-        last = part > (1.0 - 1e-9) * left
-        size = left if last else part
+        substep = min(substep, 2.0 * h)
+        last = substep > (1.0 - 1e-9) * left
+        size = left if last else substep
         half = 0.5 * size
         whole = _once(how.method, p, start + t, x, size)
         y = _once(how.method, p, start + (t + half), _once(how.method, p, start + t, x, half), half)
         sound = finite(y)
         error = relative_difference(value_of(y), value_of(whole)) if sound else math.inf
         if error > allowed and size > smallest:
-            part = shorter(size, error, allowed)
+            substep = shorter(size, error, allowed)
             continue
         x = y
         if last or not sound:
             return rounded(x)
         t += size
         if error < allowed / 32.0:
-            part = 2.0 * size
+            substep = 2.0 * size

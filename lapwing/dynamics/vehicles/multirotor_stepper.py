@@ -196,16 +196,16 @@ def _stiff_steps(method, drive, t, x, h, end):
     time, which is that from the first step.
     """
     p, memory = drive.parameters, drive.memory
-    allowed, part = p.tolerance, 2.0 * h
+    allowed, substep = p.tolerance, 2.0 * h
     smallest = SHORTEST * allowed
     x = exact(p.summation, method, AwakeState(x, stiff_effects.all_integrated(p.effects, memory)))
     origin = _origin(x, t)
     t, end = t - origin, end - origin
     while True:
         left = end - t
-        part = min(part, 2.0 * h / hooks.all_substeps(p.effects, memory, motion_of(p.layout, value_of(x)), h))
-        last = part > (1.0 - 1e-9) * left
-        size = left if last else part
+        substep = min(substep, 2.0 * h / hooks.all_substeps(p.effects, memory, motion_of(p.layout, value_of(x)), h))
+        last = substep > (1.0 - 1e-9) * left
+        size = left if last else substep
         half = 0.5 * size
         y, whole, start, length = x, x, origin + t, size
         for k in range(3):  # one call site: passing arguments at three took 1/6 of the time
@@ -216,7 +216,7 @@ def _stiff_steps(method, drive, t, x, h, end):
                 start = origin + (t + half)
         sound = finite(y)
         error = relative_difference(value_of(y), value_of(whole)) if sound else math.inf
-        part = size * _growth(error, allowed)
+        substep = size * _growth(error, allowed)
         if size > smallest and error > allowed:
             continue
         x = extrapolate(method, y, whole)

@@ -55,9 +55,9 @@ def record_actions(
         LockStepError: a state became non-finite.
     """
     whole = BlockDiagram(config, services, 1)
-    own = {each.name for each in part._parts}
+    own = {each.name for each in part._blocks}
     watched = [_Watched(r.address, r.size, r.offset) for r in image.regions if r.header and r.size]
-    for block in part._parts:
+    for block in part._blocks:
         for port in () if hasattr(block, "every") else block.outputs:
             rows = whole._rows[port.name]
             watched.append(_Watched(rows.ctypes.data, rows.nbytes, image.rows[port.name]))
@@ -98,7 +98,7 @@ PARTS = ("plant", "sensors", "autopilot", "trajectory", VEHICLE)
 class ScheduledBlock(NamedTuple):
     """A block in the order of execution, or its replacement; a Python block has neither code nor memory."""
 
-    part: Any  # `Block` or Python block
+    block: Any  # `Block` or Python block
     bound: BoundBlock | None
     every: int  # [ticks] between two steps
     vehicle: int  # index of the vehicle
@@ -158,23 +158,22 @@ def export_part(config: RunConfig, name: str) -> ExportedPart:
         raise ValueError(f"--part {name}: scene {config.scene} has no {missing[0]}; use one of {_choices(config)}")
     services = create_all(config)
     own = [service for service in services if service.name in names]
-    for part in (part for service in own for part in service.parts):
-        _check(part)
+    for block in (block for service in own for block in service.blocks):
+        _check(block)
     diagram = BlockDiagram(config, own, 1)
-    parts: Sequence[Any] = diagram._parts
-    replacing = [failures for part in parts if (failures := _propeller_failures(part))]
+    replacing = [failures for block in diagram._blocks if (failures := _propeller_failures(block))]
     scheduled = _scheduled(diagram)
     blocks = _with_replacements(scheduled, replacing)
-    produced = {port.name for part in parts for port in part.outputs}
+    produced = {port.name for block in diagram._blocks for port in block.outputs}
     lags: dict[str, int] = {}
-    for part in parts:
-        for needed in getattr(part, "inputs", ()):
+    for block in diagram._blocks:
+        for needed in getattr(block, "inputs", ()):
             if needed.port not in produced:
                 lags[needed.port] = min(lags.get(needed.port, 1), needed.delay)
     published = [port for each in names for port in config.services[each].ports]
-    roots = [(block.name, block.bound.cell) for block in blocks if block.bound]
+    roots = [(each.name, each.bound.cell) for each in blocks if each.bound]
     image = image_of(roots, diagram._rows)
-    python = {block.name for block in blocks if not block.bound}
+    python = {each.name for each in blocks if not each.bound}
     actions = [a for a in record_actions(config, services, image, diagram) if a.block in python] if python else []
     originals = {own: port for port, own in replaced_ports(fmus_of(config.services)).items()}
 
@@ -195,29 +194,31 @@ def export_part(config: RunConfig, name: str) -> ExportedPart:
     )
 
 
-def _check(part: Any) -> None:
-    if isinstance(part, Block):
+def _check(block: Any) -> None:
+    if isinstance(block, Block):
         return
-    inner = getattr(part, "_part", part)
+    inner = getattr(block, "_block", block)
     module = type(inner).__module__
     if is_connected(inner):  # a firmware
-        raise ValueError(f"{part.name}: connected to a program outside Lapwing; only compiled blocks can be exported")
-    if any(port.period != LATCHED for port in part.outputs) or not module.startswith("lapwing."):
-        raise ValueError(f"{part.name}: runs Python code of the scene; only compiled blocks can be exported")
+        raise ValueError(f"{block.name}: connected to a program outside Lapwing; only compiled blocks can be exported")
+    if any(port.period != LATCHED for port in block.outputs) or not module.startswith("lapwing."):
+        raise ValueError(f"{block.name}: runs Python code of the scene; only compiled blocks can be exported")
 
 
-def _propeller_failures(part: Any) -> PropellerFailures | None:
-    inner = getattr(part, "_part", part)
+def _propeller_failures(block: Any) -> PropellerFailures | None:
+    inner = getattr(block, "_block", block)
     return inner if isinstance(inner, PropellerFailures) else None
 
 
 def _scheduled(diagram: BlockDiagram) -> list[ScheduledBlock]:
     """Return the blocks of a diagram; those that only replace others have no effect of their own."""
-    vehicles = list(dict.fromkeys(getattr(part, "vehicle", "") for part in diagram._parts))
+    vehicles = list(dict.fromkeys(getattr(block, "vehicle", "") for block in diagram._blocks))
     return [
-        ScheduledBlock(part, bound, getattr(part, "every", 1), vehicles.index(getattr(part, "vehicle", "")), part.name)
-        for part, bound in zip(diagram._parts, diagram._codes, strict=True)
-        if not _propeller_failures(part)
+        ScheduledBlock(
+            block, bound, getattr(block, "every", 1), vehicles.index(getattr(block, "vehicle", "")), block.name
+        )
+        for block, bound in zip(diagram._blocks, diagram._codes, strict=True)
+        if not _propeller_failures(block)
     ]
 
 
@@ -229,11 +230,11 @@ def _with_replacements(
     latest = {block.name: k for k, block in enumerate(rows)}
     for failures in replacing:
         for tick, replaced in sorted(failures.replacements.items()):
-            for part, bound in replaced:
-                k = latest[part.name]
-                latest[part.name] = len(rows)
-                rows.append(rows[k]._replace(part=part, bound=bound, name=f"{part.name}.from_tick_{tick}"))
-                rows[k] = rows[k]._replace(until=tick, following=latest[part.name])
+            for block, bound in replaced:
+                k = latest[block.name]
+                latest[block.name] = len(rows)
+                rows.append(rows[k]._replace(block=block, bound=bound, name=f"{block.name}.from_tick_{tick}"))
+                rows[k] = rows[k]._replace(until=tick, following=latest[block.name])
     return rows
 
 

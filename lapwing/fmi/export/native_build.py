@@ -103,7 +103,7 @@ def _ports(part: ExportedPart, ports: Sequence[BoundaryPort]) -> list[str]:
 
 def _actions(part: ExportedPart) -> tuple[list[str], list[str], bytes]:
     """Return the rows of the tables of actions and writes, and the bytes written."""
-    order = {block.part.name: k for k, block in enumerate(part.blocks)}
+    order = {block.block.name: k for k, block in enumerate(part.blocks)}
     actions: list[str] = []
     writes: list[str] = []
     written = bytearray()
@@ -195,7 +195,7 @@ def build_folder(part: ExportedPart, variables: Sequence[Variable], prefix: str,
                 emitted[block.bound.function] = symbol = f"{prefix}_step_{k}"
                 objects.append(folder / f"step_{k}.o")
                 names = {each: f"{prefix}_{each}" for each in _SYMBOLS}
-                objects[-1].write_bytes(step_code(block.part, block.bound, symbol, cpu, names))
+                objects[-1].write_bytes(step_code(block.block, block.bound, symbol, cpu, names))
             symbols.append(emitted[block.bound.function] if block.bound else None)
         creates = any(CREATES_ARRAYS.encode() in path.read_bytes() for path in objects)
         text = tables(part, symbols, variables, f"{prefix}_image", ARRAYS if creates else 0)

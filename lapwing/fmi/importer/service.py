@@ -60,7 +60,7 @@ class FmuBlock:
         for port in self.outputs:  # columns that the FMU does not compute
             diagram.ring(port.name)[:] = pack_row(port.example)
         code = diagram.prepare(Block(self.name, self._exchange(diagram), Cell(0)))
-        diagram.replace(diagram.part(self.name), code)
+        diagram.replace(diagram.block(self.name), code)
 
     def open(self, report_wait: Callable[[str], None], log: Path | None = None) -> None:
         """Store the function that reports waits for the FMU, which may exceed the permitted silence of a service."""

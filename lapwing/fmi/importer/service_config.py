@@ -101,15 +101,15 @@ def _renamed(inputs: Sequence[InputPort], replaced: Mapping[str, str]) -> tuple[
 class _PythonBlock:
     """Python block with replaced ports; it reads ports by name from the diagram."""
 
-    def __init__(self, part: Any, replaced: Mapping[str, str]):
-        self._part, self._replaced = part, replaced
-        self.inputs = _renamed(getattr(part, "inputs", ()), replaced)
+    def __init__(self, block: Any, replaced: Mapping[str, str]):
+        self._block, self._replaced = block, replaced
+        self.inputs = _renamed(getattr(block, "inputs", ()), replaced)
 
     def __getattr__(self, name: str) -> Any:
-        return getattr(self._part, name)
+        return getattr(self._block, name)
 
     def bind(self, diagram: Any) -> None:
-        self._part.bind(_Diagram(diagram, self._replaced))
+        self._block.bind(_Diagram(diagram, self._replaced))
 
 
 class _Diagram(RenamedPortRows):

@@ -41,8 +41,8 @@ class _Plant(NamedTuple):
 def inputs_of_plant(flight: BlockDiagram) -> list[str]:
     """Return the ports that the plant reads from other services."""
     plant = next(service for service in flight.services if service.name == CLOCK_OWNER)
-    own = {port.name for part in plant.parts for port in part.outputs}
-    names = dict.fromkeys(i.port for part in plant.parts for i in getattr(part, "inputs", ()))
+    own = {port.name for block in plant.blocks for port in block.outputs}
+    names = dict.fromkeys(i.port for block in plant.blocks for i in getattr(block, "inputs", ()))
     return [name for name in names if name not in own and flight.ports[name].period != LATCHED]
 
 
@@ -83,9 +83,9 @@ def fly_parts(
 def _plant(flight: BlockDiagram, config: RunConfig) -> _Plant:
     """Return the plant of `config` at tick 0, with its inputs of a finished run."""
     service = create(config, CLOCK_OWNER)
-    delays = {i.port: i.delay for part in service.parts for i in getattr(part, "inputs", ())}
+    delays = {i.port: i.delay for block in service.blocks for i in getattr(block, "inputs", ())}
     inputs = inputs_of_plant(flight)
-    recorded_ports = {port.name for part in service.parts for port in part.outputs} | set(inputs)
+    recorded_ports = {port.name for block in service.blocks for port in block.outputs} | set(inputs)
     diagram = BlockDiagram(config, [service], 1, recorded_ports)
     updates = round(flight.config.interval / config.interval)
     for name in inputs:
@@ -108,14 +108,14 @@ def _restart(plant: _Plant, recorded: _Plant, tick: int, updates: int) -> None:
     The plant has `updates` communication steps in one of the recorded ones. The state includes outputs of previous
     ticks, through which vehicles of a fleet act on each other.
     """
-    for own, other in zip(plant.service.parts, recorded.service.parts, strict=True):
+    for own, other in zip(plant.service.blocks, recorded.service.blocks, strict=True):
         if isinstance(own, Block):
             state = read(other.state)
             if hasattr(state, "last"):  # last tick of the run
                 state = state._replace(last=(state.last + 1) * updates - 1)
             write(own.state, state)
-    outputs = {port.name for part in plant.service.parts for port in part.outputs}
+    outputs = {port.name for block in plant.service.blocks for port in block.outputs}
     first = (tick - 1) * updates + 1  # a step of the flight ends at its tick, which is that of its last update
-    for delayed in {i for part in plant.service.parts for i in getattr(part, "inputs", ()) if i.port in outputs}:
+    for delayed in {i for block in plant.service.blocks for i in getattr(block, "inputs", ()) if i.port in outputs}:
         for back in range(1, min(tick, delayed.delay) + 1):
             plant.diagram.put_row(delayed.port, first - back, recorded.diagram.row(delayed.port, tick - back))

@@ -72,7 +72,7 @@ def first_signal(a: BlockDiagram, b: BlockDiagram, limit: float) -> Signal | Non
     """
     first: Signal | None = None
     for service in a.services:
-        for port in (port for part in service.parts for port in part.outputs):
+        for port in (port for block in service.blocks for port in block.outputs):
             if service.name == CLOCK_OWNER or port.period == LATCHED:
                 continue
             pair = [columns(port.example, diagram.history(port.name, port.period)) for diagram in (a, b)]

@@ -79,7 +79,7 @@ class FirmwareBlock:
         self._python = _PYTHON(self._on_call)
         self._shared = shared_memory(self._config, diagram.ring(COMMAND), self._link.outputs, self._python)
         code = diagram.prepare(Block(self.name, self._link.exchange(self._shared, self._ring), Cell(0)))
-        diagram.replace(diagram.part(self.name), code)
+        diagram.replace(diagram.block(self.name), code)
 
     def _ring(self, port: str) -> InputRing:
         diagram = self._diagram

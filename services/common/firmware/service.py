@@ -32,7 +32,7 @@ def firmware_service(
     own: FirmwareConfig = settings.parameters
     if recorded is not None:
         service = Service(name, [], [], python_topics=TOPICS if own.phases else TOPICS[:2])
-        service.parts = [Playback(name, settings.ports, recorded, service)]
+        service.blocks = [Playback(name, settings.ports, recorded, service)]
         return service
     exchange = FirmwareBlock(name, own, settings.inputs, link)
     inputs = tuple(InputPort(port) for port in (COMMAND, ports.BATTERY, *([ports.TRAJECTORY] if own.phases else [])))

@@ -15,8 +15,8 @@ from lapwing.kernels.cell import Cell
 from lapwing.messages import Clock, Setpoint, header
 from lapwing.messages.cdr_arrays import stamp_columns
 from lapwing.messages.topics import CLOCK, COMMAND_ACKS, SETPOINT, TRAJECTORY
-from tests.cosim.parts.readings import EXAMPLE, Readings, expected
-from tests.cosim.parts.running_sum import Number, RunningSum
+from tests.cosim.blocks.readings import EXAMPLE, Readings, expected
+from tests.cosim.blocks.running_sum import Number, RunningSum
 from tests.cosim.small_graph import graph_of
 
 READINGS = Port("readings", EXAMPLE)
@@ -78,14 +78,14 @@ def test_replacement_block_keeps_state():
 
     def exchange(diagram, tick):
         if tick == 6:
-            other = replace(diagram.part("total"), parameters=RunningSum(-1.0))
+            other = replace(diagram.block("total"), parameters=RunningSum(-1.0))
             diagram.replace(other, diagram.prepare(other))
 
     diagram = graph_of(Acting("exchange", lambda t: 6, (), exchange), total, ports=(NUMBERS,), kept_ticks=32)
     diagram.put("numbers", 0, Number(1.0))
     diagram.advance(16)
     assert [diagram.latest("total", tick).value for tick in (5, 6, 15)] == [6.0, 5.0, -4.0]
-    assert diagram.part("total").parameters == RunningSum(-1.0)
+    assert diagram.block("total").parameters == RunningSum(-1.0)
 
 
 def test_latest_between_samples_is_previous_sample():
@@ -97,9 +97,9 @@ def test_latest_between_samples_is_previous_sample():
 
 
 def test_port_without_producer_is_named():
-    part = Block("total", RunningSum(1.0), Cell(0.0), (InputPort("wind"),), (TOTAL,))
+    block = Block("total", RunningSum(1.0), Cell(0.0), (InputPort("wind"),), (TOTAL,))
     with pytest.raises(LockStepError, match=r"^no service of this scene publishes wind$"):
-        graph_of(part)
+        graph_of(block)
 
 
 def encoder(topic=SETPOINT, period=1):

@@ -9,9 +9,9 @@ from lapwing.cosim.diagram.compiled_block import Block
 from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.kernels.cell import Cell, read
-from tests.cosim.parts.echo import Echo, Heard
-from tests.cosim.parts.readings import EXAMPLE, Readings, expected
-from tests.cosim.parts.running_sum import Number, RunningSum
+from tests.cosim.blocks.echo import Echo, Heard
+from tests.cosim.blocks.readings import EXAMPLE, Readings, expected
+from tests.cosim.blocks.running_sum import Number, RunningSum
 from tests.cosim.small_graph import graph_of
 
 READINGS = Port("readings", EXAMPLE)

@@ -10,7 +10,7 @@ from lapwing.cosim.run_errors import DivergedError
 from lapwing.kernels.cell import Cell
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import load, resolve
-from tests.cosim.parts.counter import Counter
+from tests.cosim.blocks.counter import Counter
 from tests.cosim.small_graph import graph_of
 
 TOGETHER = {"together": True, "apart": False}
@@ -38,7 +38,7 @@ def test_coupled_blocks_share_execution_group():
     elsewhere = Block("c", Counter(3), Cell(0), (InputPort("from another process"),), vehicle="a")
     assert independent_groups([*alone, elsewhere]) == [[0, 1, 2]]
     fleet, carried = (
-        [part for service in create_all(resolve(load(name))) for part in service.parts]
+        [block for service in create_all(resolve(load(name))) for block in service.blocks]
         for name in ("fleet", "carried_load")
     )
     assert len(independent_groups(fleet)) == 3

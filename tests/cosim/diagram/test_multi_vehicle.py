@@ -16,8 +16,8 @@ from lapwing.kernels.cell import Cell
 from lapwing.messages.topics import CLOCK, IMU, TF, custom_sensor, of_vehicle, topic_named
 from lapwing.services.process_table import create_all
 from lapwing.services.scene_resolver import from_resolved, load, parse, reseed, resolve
+from tests.cosim.blocks.signals import Signals
 from tests.cosim.memory_log import fly
-from tests.cosim.parts.signals import Signals
 from tests.cosim.small_graph import graph_of
 from tests.cosim.test_agreement import fly_apart
 from tests.scenes import head, phase
@@ -123,7 +123,7 @@ def test_fleet_config_survives_text_and_another_seed(config):
 def test_invalid_state_error_names_vehicle(config):
     part = Block("plant", None, None, failure=lambda tick: DivergedError(f"not finite at tick {tick}"))
     joined = merge_services("plant", [(member(config, "right"), Service("plant", [part], []))])
-    error = joined.parts[0].failure(3)
+    error = joined.blocks[0].failure(3)
     assert (type(error), str(error)) == (DivergedError, "right: not finite at tick 3")
 
 

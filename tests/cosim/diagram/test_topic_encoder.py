@@ -59,7 +59,7 @@ def random_value(example, random):
 def known(config, services):
     """Return the constant contents of messages from the run configuration."""
     values = {name: service.parameters for name, service in config.services.items()}
-    commander = next((p for s in services for p in s.parts if p.name == "autopilot.commander"), None)
+    commander = next((p for s in services for p in s.blocks if p.name == "autopilot.commander"), None)
     phases, words = values["trajectory"].phases if "trajectory" in values else (), WORDS
     if commander is not None:
         for words in WORDS:
@@ -67,7 +67,7 @@ def known(config, services):
         for text in ("up", "along", "down"):
             commander.phases.number(text)
         phases, words = commander.phases.table, commander.status_texts.table
-    if link := next((p for s in services for p in s.parts if hasattr(p, "reports")), None):  # foreign firmware
+    if link := next((p for s in services for p in s.blocks if hasattr(p, "reports")), None):  # foreign firmware
         link.status_texts.table += WORDS
         phases, words = phases or ("",), link.status_texts.table
     encoding = values["plant"].encoding

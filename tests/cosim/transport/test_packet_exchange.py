@@ -102,7 +102,7 @@ def exchanged(inputs):
         assert known > tick
         taken_rows.advance(min(known, LAST + 1))
         tick = known
-    return taker.parts[0].noted, counts
+    return taker.blocks[0].noted, counts
 
 
 @given(st.dictionaries(st.sampled_from(NAMES), st.integers(0, 30), min_size=1))

@@ -15,8 +15,8 @@ SHARED = {"lapwing.dynamics.effects.payload_release"}  # the mass of a load is a
 
 
 def test_plant_sources_contain_named_effects_only():
-    part = create(resolve(load("hover")), "plant").parts[0]
-    made_of = key(advance, (numba.typeof(part.parameters), numba.typeof(part.state)), None, ())
+    block = create(resolve(load("hover")), "plant").blocks[0]
+    made_of = key(advance, (numba.typeof(block.parameters), numba.typeof(block.state)), None, ())
     reached = {f"lapwing.dynamics.effects.{name}" for name in effects.names()} & _all(made_of.modules)
     assert reached - SHARED == {
         f"lapwing.dynamics.effects.{name}" for name in ("gravity", "ground_contact", "rotor_thrust")
@@ -29,6 +29,6 @@ def test_plant_sources_contain_named_effects_only():
 )
 def test_combination_of_tests_has_plant_of_shipped_scene(effect, scene):
     overrides = [*MISSION, f"effects.{effect}={{}}"] if effect else MISSION
-    one, other = (create(resolve(load(*each)), "plant").parts[0] for each in (("hover", overrides), (scene,)))
+    one, other = (create(resolve(load(*each)), "plant").blocks[0] for each in (("hover", overrides), (scene,)))
     for kind in ("parameters", "state"):
         assert numba.typeof(getattr(one, kind)) == numba.typeof(getattr(other, kind))

@@ -134,7 +134,7 @@ def test_first_signal_is_earliest_beyond_limit():
         rows["imu"][:, 1], rows["truth"][:, 0] = imu, truth
         ports = [Port("truth", example["truth"], 1), Port("imu", example["imu"], 2)]
         services = [
-            SimpleNamespace(name=name, parts=[SimpleNamespace(outputs=[port])])
+            SimpleNamespace(name=name, blocks=[SimpleNamespace(outputs=[port])])
             for name, port in zip(("plant", "sensors"), ports, strict=True)
         ]
         return SimpleNamespace(

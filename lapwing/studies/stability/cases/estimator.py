@@ -62,12 +62,12 @@ def fly(faults: dict[str, str], extra: Sequence[str] = (), *, ignore_age: bool =
     config = resolve(load("delivery_mission", overrides))
     services = create_all(config)
     if ignore_age:
-        gps = next(part for service in services for part in service.parts if isinstance(part.parameters, GpsFusion))
+        gps = next(block for service in services for block in service.blocks if isinstance(block.parameters, GpsFusion))
         gps.parameters = gps.parameters._replace(age=0)
     topics = (TRUTH, ESTIMATE)
     selected = {encoder.port for service in services for encoder in service.encoders if encoder.topic in topics}
     diagram = BlockDiagram(config, services, 64, selected)
-    filtering: Any = next(part for service in services for part in service.parts if part.name.endswith("inertial"))
+    filtering: Any = next(block for service in services for block in service.blocks if block.name.endswith("inertial"))
     min_eigenvalue = 1.0
     while not diagram.ended and diagram.tick <= config.last_tick:
         diagram.advance(min(diagram.tick + round(1.0 / config.interval), config.last_tick + 1))

@@ -261,4 +261,4 @@ def test_early_end_shows_last_output():
 def test_service_of_playback_has_no_link():
     service = betaflight.create(resolve(load("betaflight_quad", QUAD)), {})
     assert isinstance(service, Service)
-    assert [part.name for part in service.parts] == ["betaflight.playback"]
+    assert [block.name for block in service.blocks] == ["betaflight.playback"]

@@ -6,7 +6,7 @@ import numpy as np
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE
 from lapwing.kernels import always_inline
-from tests.cosim.parts.arrays import Last, Sum
+from tests.cosim.blocks.arrays import Last, Sum
 
 
 class Exchange(NamedTuple):
