@@ -56,13 +56,14 @@ def explain(folder: Path, run: int, progress: Callable[[str, int, int], None] = 
     campaign = read(folder)
     plan = plan_of(Path(campaign.plan.path), run, folder)
     texts = campaign.about["success"]
-    flights, most = 0, 2 + len(plan.keys) * (3 + HALVINGS)
+    flown: dict[str, Row] = {}
+    most = 2 + len(plan.keys) * (3 + HALVINGS)
 
     def fly(values: Mapping[str, Any]) -> Row:
-        nonlocal flights
-        flights += 1
-        progress(f"{len(values)} of {len(plan.keys)} parameters", flights, most)
-        return row_of(plan, run, values=values)
+        if (key := repr(sorted(values.items()))) not in flown:
+            progress(f"{len(values)} of {len(plan.keys)} parameters", len(flown) + 1, most)
+            flown[key] = row_of(plan, run, values=values)
+        return flown[key]
 
     kept = plan.values(run)
     original = fly(kept)
@@ -101,7 +102,7 @@ def explain(folder: Path, run: int, progress: Callable[[str, int, int], None] = 
     sets = [part for text in overrides for part in ("--set", text)]
     return Explanation(
         run, original["outcome_text"], tuple(missed), tuple(changes),
-        tuple(key for key in plan.keys if key not in kept), fly(kept)["outcome_text"], flights,
+        tuple(key for key in plan.keys if key not in kept), fly(kept)["outcome_text"], len(flown),
         shlex.join(["lapwing", "run", plan.path, *sets]),
     )  # fmt: skip
 
