@@ -16,12 +16,14 @@ from lapwing.cosim.diagram.tick_schedule import Port
 from lapwing.dynamics.geodesy import Home
 from lapwing.flights import rotation_arrays as rotations
 from lapwing.flights.log_import.recording import Recording, Series
+from lapwing.services.ardupilot.link import ArduPilotLink
 from lapwing.services.common import ports
 from lapwing.services.common.firmware.mission_client import MissionClient
 from lapwing.services.common.firmware.service import firmware_service
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.mavlink.geo_coordinates import enu_to_geodetic
 from lapwing.services.common.schemas.communication_schema import Communication
+from lapwing.services.px4.link import Px4Link
 from lapwing.services.scene_resolver import load, resolve
 
 EVERY = 20_000.0  # [us] between two estimates
@@ -168,24 +170,15 @@ def feed(flight: Recording, firmware: str, command: Sequence[str], overrides: Se
         parameters = parameters._replace(own=parameters.own._replace(**first))
     last_tick = int((own.attitude.time[-1] - begin) / config.interval)
     config = config._replace(last_tick=last_tick, services={firmware: settings._replace(parameters=parameters)})
-    links: list[Any] = []
-
-    def link(chosen: Any) -> Any:
-        from lapwing.services.ardupilot.link import ArduPilotLink
-        from lapwing.services.px4.link import Px4Link
-
-        links.append((Px4Link if firmware == "px4" else ArduPilotLink)(chosen))
-        links[0].CLIENT = Estimates
-        return links[0]
-
-    services = [Service("feed", [block], []), firmware_service(config, name=firmware, link=link)]
+    link = (Px4Link if firmware == "px4" else ArduPilotLink)(config.services[firmware].parameters, Estimates)
+    services = [Service("feed", [block], []), firmware_service(config, name=firmware, link=lambda _: link)]
     diagram = BlockDiagram(config, services, KEPT_TICKS)
     try:
         diagram.advance(last_tick + 1)
         report = diagram.reports["firmware"]
     finally:
         diagram.close()
-    return _estimate(links[0], begin, report)
+    return _estimate(link, begin, report)
 
 
 def recorded(flight: Recording) -> Estimate:

@@ -79,9 +79,9 @@ class ArduPilotLink(MavlinkLink):
 
     _was_resent = False  # a frame was resent since the last answer
 
-    def __init__(self, config: FirmwareConfig) -> None:
-        """Store the configuration."""
-        super().__init__(config)
+    def __init__(self, config: FirmwareConfig, client: type[MissionClient] = MissionClient) -> None:
+        """Store the configuration; see `MavlinkLink`."""
+        super().__init__(config, client)
         self._pulses = pulse_range(parameters_in(config.parameter_text) | config.parameters)
         self._next = np.full(1, ANY)  # count of the next frame; compiled code increments it for each frame in order
 

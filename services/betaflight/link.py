@@ -241,8 +241,9 @@ class BetaflightLink(ProgramLink):
         landed = stage in ("waiting", "landed")
         finished = self._pilot.finished and not armed
         return FirmwareOutput(
-            self._outputs, armed, landed, finished, f"angle ({stage})", text, blockers, self._pilot.attitude_reference
-        )
+            self._outputs, armed, landed, finished, f"angle ({stage})", text, blockers,
+            self._pilot.attitude_reference, follows=stage in ("waiting", "flying"),
+        )  # fmt: skip
 
 
 create = partial(firmware_service, name="betaflight", link=BetaflightLink)

@@ -24,6 +24,7 @@ from lapwing.services.common.firmware.firmware_config import FirmwareConfig
 from lapwing.services.common.firmware.link import Read
 from lapwing.services.common.firmware.mavlink_link import MavlinkLink
 from lapwing.services.common.firmware.mavlink_transport import UdpTransport
+from lapwing.services.common.firmware.mission_client import MissionClient
 from lapwing.services.common.firmware.program import TCP, UDP, OwnPort
 from lapwing.services.common.firmware.repeatable import Turns
 from lapwing.services.common.firmware.service import firmware_service
@@ -56,9 +57,9 @@ class Px4Link(MavlinkLink):
     )
     _server: socket.socket | None = None
 
-    def __init__(self, config: FirmwareConfig) -> None:
-        """Store the configuration."""
-        super().__init__(config)
+    def __init__(self, config: FirmwareConfig, client: type[MissionClient] = MissionClient) -> None:
+        """Store the configuration; see `MavlinkLink`."""
+        super().__init__(config, client)
         self._rare = rare_messages(config.own.datum.home)
         self._sequence, self._rest, self._epoch, self._armed, self._silent, self._answers = np.zeros((6, 1), np.int64)
         self._port = 0  # of the firmware's end, 0 without a connection

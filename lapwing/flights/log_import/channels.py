@@ -39,6 +39,7 @@ class Channels:
         notes: remarks on the import, a line each.
         unknown: names of topics without a counterpart.
         in_volts: True if `duty` has voltages.
+        firmware: firmware that numbers the motors, see `Recording`.
         battery_window: window of the running median of the voltage [s].
     """
 
@@ -47,6 +48,7 @@ class Channels:
     notes: list[str] = field(default_factory=list)
     unknown: Sequence[str] = ()
     in_volts: bool = False
+    firmware: str = ""
     battery_window: float = DIP
 
     def offer(self, quantity: str, candidates: Iterable[Series | None]) -> None:
@@ -148,7 +150,7 @@ def to_recording(
         duty if channels.in_volts else duty * np.where(np.isfinite(volts), volts, 1.0)[:, None], volts, valid, power,
         faults=faults, sources=tuple(rows_of(chosen, {name: int(mask.sum()) for name, mask in gaps.items()})),
         notes=tuple(notes), readings={name: s for name, s in readings.items() if len(s.time)},
-        unknown=tuple(channels.unknown), has_shares=has_shares, **desired,
+        unknown=tuple(channels.unknown), has_shares=has_shares, firmware=channels.firmware, **desired,
     )  # fmt: skip
 
 

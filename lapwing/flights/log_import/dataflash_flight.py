@@ -62,7 +62,7 @@ def read_dataflash_flight(path: Path, choices: Choices = Choices()) -> Recording
         ValueError: the file is not a dataflash log, or a required message is missing.
     """
     messages, parameters, unknown, notes = _messages(path)
-    channels = Channels(unknown=tuple(sorted(unknown)), notes=notes)
+    channels = Channels(unknown=tuple(sorted(unknown)), notes=notes, firmware="ardupilot")
     offer = channels.offer
 
     def every(name: str, *fields: str, scale: Any = 1.0, **labels: Any) -> list[Series]:

@@ -172,6 +172,7 @@ class Recording:
         readings: other sensors of the log by name (see `write_log.SENSORS`), at their rates.
         unknown: names of the log's messages without a counterpart.
         has_shares: True if `motor_voltage` has shares of the full voltage, which the log does not have.
+        firmware: "px4" or "ardupilot" if the motors are numbered as this firmware does; "": in the airframe's order.
     """
 
     name: str
@@ -193,6 +194,7 @@ class Recording:
     readings: Mapping[str, Series] = field(default_factory=dict)
     unknown: tuple[str, ...] = ()
     has_shares: bool = False
+    firmware: str = ""
 
     def __len__(self) -> int:
         return len(self.valid)

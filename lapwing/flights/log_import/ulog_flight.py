@@ -47,7 +47,8 @@ def read_ulog_flight(path: Path, choices: Choices = Choices()) -> Recording:  # 
         with redirect_stdout(StringIO()), redirect_stderr(StringIO()):  # pyulog prints messages on damaged data
             log = ULog(str(path))
     topics = _Topics(log)
-    channels = Channels(dropouts=topics.dropouts)
+    firmware = "px4" if log.msg_info_dict.get("sys_name") == "PX4" else ""  # Lapwing writes such files, too
+    channels = Channels(dropouts=topics.dropouts, firmware=firmware)
     every, vector, offer = topics.every, topics.vector, channels.offer
     offer("attitude", every("vehicle_attitude", *(f"q[{k}]" for k in range(4)), quantity="attitude", frame="NED FRD"))
     for quantity, fields in (("position", ("x", "y", "z")), ("velocity", ("vx", "vy", "vz"))):

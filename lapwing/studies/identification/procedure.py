@@ -15,7 +15,7 @@ from lapwing.cosim.scene import Overrides, Scene
 from lapwing.cosim.scene.toml_text import dump
 from lapwing.dynamics.config_error import did_you_mean
 from lapwing.flights.log_import.recording import Recording
-from lapwing.services.common.schemas.vehicle_schema import VehicleAirframe, airframe
+from lapwing.services.common.schemas.vehicle_schema import VehicleAirframe
 from lapwing.services.scene_resolver import load_one
 from lapwing.studies.campaign import posterior
 from lapwing.studies.campaign.distributions import lognormal, normal
@@ -26,6 +26,7 @@ from lapwing.studies.validation.procedure import (
     STRIDE,
     Validation,
     compare_with_flights,
+    on_rotors,
     plant_of,
     read_flights,
     with_windows,
@@ -93,7 +94,7 @@ def identify(
     base = load_one(scene, overrides)
     start = [start_value(base, key) for key in keys]
     recordings, skipped = read_flights(paths, mapping, report)
-    recordings = [r.in_volts(airframe(base).motor.max_voltage) for r in recordings]
+    recordings = on_rotors(base, recordings)
     test_horizons = tuple(sorted({max(1, round(time / recordings[0].interval)) for time in TEST_TIMES}))
     missing = unmeasured_motion(recordings)
     fields = tuple(f for f in FIELDS if f not in missing) + (("specific_force",) if missing else ())

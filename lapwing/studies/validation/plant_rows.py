@@ -58,7 +58,6 @@ class PlantRows:
         steps = int(np.ceil(interval / LONGEST_STEP - 1e-9))
         self.interval = interval
         self._base = _with_wrench(load_one(scene, overrides))
-        self.full_voltage = airframe(self._base).motor.max_voltage
         self._rate, self._step = rate, interval / steps
         first = _plant(self._scene({}))
         self._core = first.core

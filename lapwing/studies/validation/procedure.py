@@ -10,6 +10,10 @@ import numpy as np
 from lapwing.cosim.scene import Overrides, Scene
 from lapwing.flights.log_import.open_flight import open_flight
 from lapwing.flights.log_import.recording import Recording
+from lapwing.services.common.firmware.motor_order import QUADROTOR_X, motor_order
+from lapwing.services.common.firmware.schema import firmware_of
+from lapwing.services.common.schemas.vehicle_schema import airframe
+from lapwing.services.scene_resolver import load_one
 from lapwing.studies.validation.closed_loop import ClosedLoop, fly_setpoints
 from lapwing.studies.validation.linear_baseline import linear_fit
 from lapwing.studies.validation.plant_rows import PlantRows
@@ -117,7 +121,7 @@ def validate(
     flights = [with_made_up_motion(flight, missing) for flight in flights]
     recordings, unused = with_windows(flights, horizons[-1], stride)
     plant = plant_of(scene, recordings, overrides)
-    recordings = [recording.in_volts(plant.full_voltage) for recording in recordings]
+    recordings = on_rotors(load_one(scene, overrides), recordings)
     name = Path(str(getattr(scene, "name", scene))).stem
     memory = trim_memory(memory, missing)
     validation = compare_with_flights(name, plant, recordings, horizons, memory, stride, report, unmeasured=missing)
@@ -210,6 +214,22 @@ def plant_of(scene: Scene | str | Path, recordings: Sequence[Recording], overrid
                 f"{recording.name}: {recording.rotors} motors, the scene has {plant.rotors}; use the vehicle's scene"
             )
     return plant
+
+
+def on_rotors(base: Scene, recordings: Sequence[Recording]) -> list[Recording]:
+    """Return the flights with the voltages [V] of the scene's rotors, in their order.
+
+    The log of a firmware that flies the scene has the firmware's order.
+    """
+    frame, firmware = airframe(base), firmware_of(base)
+    result = []
+    for recording in recordings:
+        volts = recording.in_volts(frame.motor.max_voltage)
+        if recording.firmware == firmware and recording.rotors == len(QUADROTOR_X):
+            order = list(motor_order(frame, QUADROTOR_X, firmware))
+            volts = replace(volts, motor_voltage=volts.motor_voltage[:, order])
+        result.append(volts)
+    return result
 
 
 def read_flights(

@@ -142,7 +142,8 @@ class FirmwareBlock:
             raise FirmwareError(f"{self._config.firmware}: invalid motor outputs {values} {at}; check its motor setup")
         duty = tuple(min(max(values[i], 0.0), 1.0) for i in self._config.order) if output.armed else self._zero.duty
         text_id, attitude = self._text_id(output), output.attitude_reference
-        return FirmwareCommand(duty, output.armed, output.landed, output.finished, text_id, attitude)
+        state = output.armed, output.landed, output.finished
+        return FirmwareCommand(duty, *state, text_id, attitude, output.follows)
 
     def _text_id(self, output: FirmwareOutput) -> int:
         return self.status_texts.number(StatusText(output.mode, output.text, output.arming_blockers))

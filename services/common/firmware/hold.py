@@ -4,11 +4,12 @@ from typing import Any, NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.vector import ZERO, Vec3
-from lapwing.kernels import always_inline
+from lapwing.kernels import always_inline, math
 from lapwing.kernels.codegen import map_tuple, reduce_tuple
 from lapwing.services.common.ports import AutopilotStatus, MotorCommand, PerRotor, Setpoint
 
 COMMAND = "firmware"  # port of `FirmwareCommand`
+UNKNOWN = (math.nan, math.nan, math.nan)
 
 
 class FirmwareCommand(NamedTuple):
@@ -20,6 +21,7 @@ class FirmwareCommand(NamedTuple):
     finished: bool = False
     status_text_id: int = 0  # index of the status texts
     attitude_reference: Vec3 = ZERO  # [rad] roll, pitch, yaw
+    follows: bool = False  # the scene's trajectory commands the vehicle
 
 
 class Hold(NamedTuple):
@@ -41,8 +43,10 @@ def _volts(supply: float, duty: float, _: float) -> float:
 
 
 @always_inline
-def _reference(_: int, sample: InputSample, __: InputSample) -> Any:
-    return sample.value
+def _reference(follows: bool, sample: InputSample, _: InputSample) -> Any:
+    x = sample.value
+    velocity = x.velocity_world if follows else UNKNOWN
+    return Setpoint(x.position_world, velocity, x.acceleration_world, x.yaw, x.yaw_rate, x.phase, x.final)
 
 
 @always_inline
@@ -52,9 +56,12 @@ def _phase(_: int, phase: int, reference: Setpoint, __: Setpoint) -> int:
 
 @always_inline
 def step(p: Hold, s: HeldState, tick: int, inputs: tuple[InputSample, ...]) -> tuple[HeldState, tuple, int]:
-    """Return the motor command, the status, and the reference of the trajectory at `tick`."""
+    """Return the motor command, the status, and the reference of the trajectory at `tick`.
+
+    Its velocity is not a number while the firmware does not follow it.
+    """
     command, battery = inputs[0].value, inputs[1]
-    references = map_tuple(_reference, 0, inputs[2:], inputs[2:])
+    references = map_tuple(_reference, command.follows, inputs[2:], inputs[2:])
     supply = battery.value.voltage if battery.due else s.supply
     motors = MotorCommand(
         map_tuple(_volts, supply, command.duty, p.none), command.armed, p.none, command.attitude_reference

@@ -39,6 +39,7 @@ class FirmwareOutput(NamedTuple):
     text: str = ""  # reason of an active failsafe; "": none
     arming_blockers: tuple[str, ...] = ()
     attitude_reference: tuple[float, float, float] = (0.0, 0.0, 0.0)  # [rad] roll, pitch, yaw setpoints, if known
+    follows: bool = False  # the scene's trajectory commands the vehicle, not a mission, a failsafe or a landing
 
 
 @dataclass

@@ -21,7 +21,6 @@ class MavlinkLink(ProgramLink):
     """
 
     CONVENTIONS: Conventions
-    CLIENT = MissionClient
 
     _run: Callable[[dict[str, float]], None]  # start the program with parameters
     _connect: Callable[[], None]  # wait for the firmware
@@ -31,10 +30,10 @@ class MavlinkLink(ProgramLink):
     _shared: Shared
     _transport: Transport | None = None
 
-    def __init__(self, config: FirmwareConfig) -> None:
-        """Store the configuration."""
+    def __init__(self, config: FirmwareConfig, client: type[MissionClient] = MissionClient) -> None:
+        """Store the configuration, and the class of the client of the MAVLink link."""
         super().__init__(config)
-        self._own, self._socket = config.own, SharedSocket()
+        self._own, self._socket, self._client_of = config.own, SharedSocket(), client
 
     @property
     def client(self) -> MissionClient:
@@ -83,8 +82,8 @@ class MavlinkLink(ProgramLink):
         assert self._transport is not None
         if config.command:
             self._run({**conventions.parameters, **described, **chosen})
-            self._client = self.CLIENT(self._transport, conventions, messages, chosen, sets=False)
+            self._client = self._client_of(self._transport, conventions, messages, chosen, sets=False)
         else:
             required = {**(conventions.parameters if items else {}), **chosen}
-            self._client = self.CLIENT(self._transport, conventions, messages, required, optional=described)
+            self._client = self._client_of(self._transport, conventions, messages, required, optional=described)
         self._connect()

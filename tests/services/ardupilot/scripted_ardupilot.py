@@ -3,11 +3,12 @@
 Started as `python scripted_ardupilot.py --instance N ...`. It opens its first MAVLink port as ArduPilot does, and ends
 if it cannot. With `--die` it exits in flight, with `--stop` it is stopped there for 3 s. With `--slow-exit S` it keeps
 its port for S seconds after SIGTERM. With `--starts FILE` it appends its instance and process id to a file. It writes a
-dataflash log as text, `logs/00000001.BIN`. With `--estimate BIAS` it sends the state as its estimate by MAVLink, with a
-bias of the velocity north [m/s].
+dataflash log as text, `logs/00000001.BIN`. With `--yaw D` outputs that differ by D turn the vehicle from 3 s
+to 4 s. With `--estimate BIAS` it sends the state as its estimate by MAVLink, with a bias of the velocity north [m/s].
 """
 
 import argparse
+import math
 import os
 import signal
 import socket
@@ -23,7 +24,7 @@ from tests.services.ardupilot.peer import ArduPilotPeer
 from tests.services.stopped import stop_for
 
 HOVER, HEIGHT = 0.62, 2.0  # duty in hover; [m]
-
+SPINS = (-1, -1, 1, 1)  # torque of the outputs 1 to 4: the propellers of the last two turn clockwise
 
 FORMATS = (
     "FMT, 128, 89, FMT, BBnNZ, Type,Length,Name,Format,Columns",
@@ -35,14 +36,14 @@ FORMATS = (
 )
 
 
-def log_lines(state, duty):
-    """Return the lines of the log with a state and the outputs that follow it."""
+def log_lines(state, pulses):
+    """Return the lines of the log with a state and the outputs [us] that follow it."""
     us = round(state["timestamp"][0] * 1e6)
     fields = {
         "IMU": (0, *state["gyro"], *state["accel_body"]),
         "XKF1": (0, *state["velocity"], *state["position"]),
         "XKQ": (0, *state["quaternion"]),
-        "RCOU": (1000 + round(1000 * duty),) * 4,
+        "RCOU": pulses,
         "BAT": (0, *state["battery"]),
     }
     return [", ".join(map(str, (name, us, *values))) for name, values in fields.items()]
@@ -66,6 +67,7 @@ def main():
     parser.add_argument("--stop", action="store_true")
     parser.add_argument("--slow-exit", type=float, default=0.0)
     parser.add_argument("--starts", type=Path)
+    parser.add_argument("--yaw", type=float, default=0.0)
     parser.add_argument("--estimate", type=float)
     options, _ = parser.parse_known_args()
     if options.starts:
@@ -85,19 +87,21 @@ def main():
     Path("logs").mkdir(exist_ok=True)
     log = Path("logs/00000001.BIN").open("w", buffering=1)  # noqa: SIM115 (open until the program is killed)
     log.writelines(f"{line}\n" for line in FORMATS)
-    peer, duty, ground = ArduPilotPeer(9002 + 10 * options.instance), 0.0, None
+    peer, pulses, ground = ArduPilotPeer(9002 + 10 * options.instance), [1000] * 4, None
     with server:
         client, codec = None, mavlink.MAVLink(None, srcSystem=1, srcComponent=1)
         if options.estimate is not None:
             client, _ = server.accept()
         while True:
-            state = peer.exchange((1000 + round(1000 * duty),) * 4 + (0,) * 12)
+            state = peer.exchange((*pulses, *(0,) * 12))
             ground = -state["position"][2] if ground is None else ground
             height, rate, elapsed = -state["position"][2] - ground, -state["velocity"][2], state["timestamp"][0] - 1.001
             target = HEIGHT if elapsed < 5.0 else HEIGHT - 0.5 * (elapsed - 5.0)
             duty = min(max(HOVER + 0.1 * (target - height) - 0.08 * rate, 0.0), 1.0) if 0.0 < elapsed < 12.0 else 0.0
+            turn = math.copysign(options.yaw, 3.5 - elapsed) if 3.0 < elapsed < 4.0 else 0.0  # left, then stop
+            pulses = [1000 + round(1000 * (duty + sign * turn)) for sign in SPINS]
             if peer.count % 10 == 0:
-                log.writelines(f"{line}\n" for line in log_lines(state, duty))
+                log.writelines(f"{line}\n" for line in log_lines(state, pulses))
             if client and peer.count % 20 == 0:
                 client.sendall(b"".join(message.pack(codec) for message in estimate(state, options.estimate)))
             if options.stop and elapsed > 2.0:

@@ -66,6 +66,20 @@ def test_own_log_of_firmware_agrees_with_scene(tmp_path):
 
 
 @pytest.mark.long
+def test_outputs_in_own_log_drive_the_rotors_of_the_scene(tmp_path):
+    """ArduPilot numbers its outputs in another order than the scenes their rotors."""
+    run(tmp_path, "--yaw", 0.02, seconds=9.0)
+    log = (tmp_path / "flight.ardupilot.bin").rename(tmp_path / "flight.log")
+    errors = []
+    for scene in ("ardupilot_quad", "px4_quad"):  # the same vehicle, with the outputs in its own order
+        lapwing("validate", scene, log, "--json", tmp_path / "errors.json")
+        comparisons = json.loads((tmp_path / "errors.json").read_text())["verdict"]["comparisons"]
+        (rate,) = (c["baselines"] for c in comparisons if (c["signal"], c["time"]) == ("rate", 0.01))
+        errors.append(rate["constant_velocity"]["ratio"])
+    assert errors[0] < 0.5 < 2.0 < errors[1]
+
+
+@pytest.mark.long
 def test_campaign_with_two_workers_finds_free_ports_and_leaves_no_files(tmp_path):
     """A program keeps its ports for a while after the request to end, and another simulator has those of instance 1."""
     temporary, starts = tmp_path / "tmp", tmp_path / "starts.txt"

@@ -110,6 +110,7 @@ def test_lost_position_ends_in_level_landing(tmp_path, monkeypatch):
     assert "no position: descends level and lands at 5." in str(flight.outcome)
     height = flight.truth.position[:, 2]
     assert flight.outcome.touchdown == pytest.approx(0.8, abs=0.2)
+    assert flight.outcome.commanded is None  # the trajectory does not command this descent
     assert height[(flight.truth.times > 4.0) & (flight.truth.times < 6.0)].min() > 1.5
     assert abs(flight.truth.position[:, :2]).max() < 2.0
 

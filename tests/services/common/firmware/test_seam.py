@@ -1,6 +1,7 @@
 """Common parts of firmware adapters: motor order, volts, time-outs, playback of recorded commands."""
 
 import json
+import math
 import os
 import re
 import subprocess
@@ -24,7 +25,7 @@ from lapwing.services.common.firmware.link import FirmwareOutput, LinkReport
 from lapwing.services.common.firmware.motor_order import QUADROTOR_X, Output, motor_order
 from lapwing.services.common.firmware.program import FirmwareError, Program
 from lapwing.services.common.firmware.service import firmware_service
-from lapwing.services.common.ports import BatteryReading
+from lapwing.services.common.ports import BatteryReading, Setpoint
 from lapwing.services.common.schemas.vehicle_schema import airframe
 from lapwing.services.scene_resolver import load, resolve
 from tests.participants import running
@@ -66,6 +67,17 @@ def test_output_is_fraction_of_battery_voltage():
     state, (motors, status), _ = hold.step.py_func(p, state, 2, (command, before))
     assert motors.motor_voltage == pytest.approx((0.0, 4.0, 8.0, 16.0))
     assert (motors.armed, status.armed, status.landed, motors.thrust) == (True, True, False, none)
+
+
+@pytest.mark.parametrize("follows", [True, False])
+def test_velocity_of_trajectory_is_unknown_while_firmware_does_not_follow_it(follows):
+    command = InputSample(True, FirmwareCommand((0.0,) * 4, True, follows=follows))
+    reference = Setpoint((1.0, 2.0, 3.0), (0.0, 0.0, -0.5), phase=2)
+    inputs = command, InputSample(False, BatteryReading()), InputSample(True, reference)
+    setpoint = hold.step.py_func(Hold(14.8, (0.0,) * 4), HeldState(14.8), 0, inputs)[1][2]
+    expected = reference.velocity_world if follows else (math.nan,) * 3
+    assert setpoint.velocity_world == pytest.approx(expected, nan_ok=True)
+    assert setpoint._replace(velocity_world=reference.velocity_world) == reference
 
 
 def test_timeout_counts_from_restart():
