@@ -1,6 +1,8 @@
 """`[solver] accuracy`: cheapest integrator and step for a scene, from cached measurements.
 
-The choice counts evaluations of the right-hand side, so it is a function of the scene and the version alone.
+The solvers repeat the commands that the scene's own flight records. If it has commands from outside, fails or is long,
+they fly manoeuvres instead, which are harder than most flights. The choice counts evaluations of the right-hand side,
+so it is a function of the scene and the version alone.
 """
 
 import hashlib
@@ -21,15 +23,20 @@ from lapwing.services.common.schemas.run_schema import Run
 from lapwing.services.common.schemas.vehicle_schema import Effects, Vehicle
 from lapwing.services.plant.schema import Solver, accuracy_to_select_for
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.studies.accuracy import flight_accuracy, plant, scenes
+from lapwing.studies.accuracy import flight_accuracy, own_flight, plant, scenes
 from lapwing.studies.accuracy.error_budget import acting_on_neighbours
 from lapwing.studies.accuracy.problem import SolverMethod
 from lapwing.studies.accuracy.work_precision import FINE_ENOUGH, Point, cheapest, measure
 
 CANDIDATES = ("rkmk2", "rk4_renormalised", "rkmk54", "rk8_renormalised")  # each the cheapest for some system and error
+IN_FLIGHT = CANDIDATES[1:]  # for a flight of multirotors; rkmk2 was the cheapest in none, and compiles for seconds
+MARGIN = 1.1  # accuracy over the error in the scene's own flight, for the error of the reference
+DIVISORS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32)  # steps per communication step in the own flight
+GAIN = 2  # largest excess of the observed order over that of the method
 IMPACT_SHARE = 3e-3  # of the accuracy, because an impact amplifies position errors to 300 times larger velocity errors
 JUMP_SHARE = 0.125  # of the accuracy while voltages jump, because the largest error of such flights is 7 times larger
 MOST_STEPS = 32  # per communication step, half of those of the reference: the finest step that is tried
+SOURCES = "dynamics", "services"  # packages of which all modules decide on a measurement
 HIDDEN = 2.0  # factor by which a finer step errs more if the longer one is under error control
 
 
@@ -48,18 +55,83 @@ def overrides(scene: Scene, notify: Callable[[str], None]) -> list[str]:
     accuracy = accuracy_to_select_for(scene)
     if accuracy is None:
         return []
-    distinct = {repr(scenes.physics(vehicle)): vehicle for vehicle in scene.each_vehicle}.values()
     try:
-        selected = cheapest(
-            _combine_vehicles([_expected_points(vehicle, accuracy, notify) for vehicle in distinct]), accuracy
-        )
+        method, step = _for_own_flight(scene, accuracy, notify) or _for_manoeuvres(scene, accuracy, notify)
     except ConfigError as error:
         message = f"{accuracy:g}: {error.message}"
         raise SceneError("solver.accuracy", message, source=KeyOrigin(scene.path)) from None
     # exact step that `Solver.check` accepts as a divisor of the communication step
-    chosen = [f'solver.integrator="{selected.method}"', f"solver.step={selected.setting!r}"]
+    chosen = [f'solver.integrator="{method}"', f"solver.step={step!r}"]
     _warn_of_neighbours(scene, chosen, accuracy, notify)
     return chosen
+
+
+def _for_own_flight(scene: Scene, accuracy: float, notify: Callable[[str], None]) -> tuple[str, float] | None:
+    """Return (integrator, step [s]) for the scene's own flight; None if it has no known commands, fails or is long.
+
+    Raises:
+        ConfigError: no integrator meets the accuracy.
+    """
+    if not own_flight.has_known_commands(scene):
+        return None
+    first, reference = scene.each_vehicle[0], own_flight.reference_config(scene, accuracy)
+    path = _cache_file(first, _names(first, IN_FLIGHT), f"{accuracy!r} {reference.resolved!r}")
+    if path and path.is_file():
+        with suppress(OSError, ValueError):
+            method, step = json.loads(path.read_text(encoding="utf-8"))
+            return (str(method), float(step)) if method else None
+    notify("flying the scene with each integrator for solver.accuracy (first time only)")
+    try:
+        flight = own_flight.OwnFlight(scene, reference)
+    except ValueError:
+        _store(path, json.dumps(["", 0.0]))
+        return None
+    selected = _cheapest_in(flight, first, accuracy)
+    _store(path, json.dumps([selected.method, selected.setting]))
+    return selected.method, selected.setting
+
+
+def _cheapest_in(flight: own_flight.OwnFlight, scene: Scene, accuracy: float) -> Point:
+    """Return the point of least work that meets the accuracy in a flight with the margin, or if none does, without.
+
+    Raises:
+        ConfigError: no point meets the accuracy.
+    """
+    candidates = []
+    for name in _names(scene, IN_FLIGHT):
+        method = integrators.get(name)
+        per_step = getattr(method, "EVALUATIONS", None)
+        for n in (n for n in DIVISORS if flight.interval / n <= plant.longest_step(scene)):
+            evaluations = per_step and n * per_step
+            candidates.append(Point(name, method.ORDER, "s", flight.interval / n, math.inf, math.nan, evaluations, {}))
+    points: list[Point] = []
+    for point in sorted(candidates, key=lambda p: p.work):
+        longer, steps = [p for p in points if p.method == point.method], round(flight.interval / point.setting)
+        hopeless = any(p.error * (point.setting / p.setting) ** (p.order + GAIN) > accuracy for p in longer)
+        if hopeless and steps < DIVISORS[-1]:
+            continue
+        points.append(point._replace(error=flight.error(point.method, steps).error))
+        if points[-1].error <= accuracy / MARGIN:
+            return points[-1]
+    return cheapest(points, accuracy)
+
+
+def _for_manoeuvres(scene: Scene, accuracy: float, notify: Callable[[str], None]) -> tuple[str, float]:
+    """Return (integrator, step [s]) for manoeuvres of each vehicle in free flight.
+
+    Raises:
+        ConfigError: no integrator meets the accuracy.
+    """
+    distinct = {repr(scenes.physics(vehicle)): vehicle for vehicle in scene.each_vehicle}.values()
+    points = _combine_vehicles([_expected_points(vehicle, accuracy, notify) for vehicle in distinct])
+    selected = cheapest(points, accuracy)
+    return selected.method, selected.setting
+
+
+def _names(scene: Scene, candidates: tuple[str, ...] = CANDIDATES) -> tuple[str, ...]:
+    """Return the names of the integrators from which one is selected."""
+    solver = scene[Solver]
+    return (solver.integrator,) if "integrator" in solver.model_fields_set else candidates
 
 
 def _warn_of_neighbours(scene: Scene, chosen: list[str], accuracy: float, notify: Callable[[str], None]) -> None:
@@ -90,8 +162,7 @@ def _combine_vehicles(vehicles: list[list[Point]]) -> list[Point]:
 
 def _expected_points(scene: Scene, accuracy: float, notify: Callable[[str], None]) -> list[Point]:
     """Return the points of one vehicle with the largest errors expected in flight."""
-    solver = scene[Solver]
-    names = (solver.integrator,) if "integrator" in solver.model_fields_set else CANDIDATES
+    names = _names(scene)
     gentle, *others = (
         [p for p in points if p.method in names or len(names) > 1] for points in _points(scene, names, notify)
     )
@@ -175,12 +246,9 @@ def _cache_file(scene: Scene, names: tuple[str, ...], more: str = "") -> Path | 
     folder = cache_folder()
     if folder is None:
         return None
-    modules = [
-        __name__,
-        f"lapwing.services.plant.models.{scene[Vehicle].model}",
-        *(f"lapwing.dynamics.integrators.{name}" for name in integrators.names()),
-        *(f"lapwing.dynamics.effects.{name}" for name in scene[Effects].tables),
-    ]
+    root = Path(__file__).parents[2]
+    files = [file.relative_to(root) for part in SOURCES for file in sorted((root / part).rglob("*.py"))]
+    modules = [__name__, *(".".join(("lapwing", *file.with_suffix("").parts)) for file in files)]
     digest = hashlib.blake2b(source_digest(modules).encode(), digest_size=8)
     run, manoeuvres = scene[Run], [voltages.__name__ for voltages in plant.MANOEUVRES]
     flight = names, manoeuvres, run.seed, scene[Vehicle].name, run.duration, scene[Communication].rate
