@@ -20,8 +20,9 @@ from lapwing.services.common.schemas.communication_schema import Communication
 from lapwing.services.plant.schema import Solver
 from lapwing.services.scene_resolver import load, parse, resolve
 from lapwing.studies.accuracy.open_loop import fly_parts, starts_of_parts
+from lapwing.studies.accuracy.own_flight import DIVISORS
 from lapwing.studies.accuracy.scenes import FINEST
-from lapwing.studies.accuracy.solver_selection import CANDIDATES, DIVISORS, overrides
+from lapwing.studies.accuracy.solver_selection import CANDIDATES, overrides
 from lapwing.studies.accuracy.state_errors import TOPICS, differences_of_all, worst_of
 from lapwing.studies.simulate import fly_with_ports
 

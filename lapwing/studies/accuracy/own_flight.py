@@ -1,10 +1,12 @@
 """Errors of solvers in a scene's own flight: they repeat the commands that it records with a reference solver."""
 
 import math
+from collections.abc import Iterable
 
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.run_errors import DivergedError
 from lapwing.cosim.scene import Scene
+from lapwing.dynamics import integrators
 from lapwing.services.common.firmware.schema import flown_by_firmware
 from lapwing.services.common.schemas.communication_schema import Communication
 from lapwing.services.plant.schema import LEAST_ACCURACIES
@@ -12,12 +14,17 @@ from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.accuracy import plant
 from lapwing.studies.accuracy.open_loop import fly_parts, starts_of_parts
 from lapwing.studies.accuracy.state_errors import TOPICS, Quantity, differences_of_all, worst_of
+from lapwing.studies.accuracy.work_precision import Point, cheapest
 from lapwing.studies.simulate import fly_with_ports
 
 REFERENCE, FINEST = "rk8_renormalised", 32  # integrator, steps in a communication step
 STRICTER = 1e-3  # factor of the accuracy in contact, in the reference
 STRICTEST = LEAST_ACCURACIES["ground_contact"]  # limit of the accuracy in contact by round-off
 LONGEST = 200.0  # [s] of all vehicles together
+CANDIDATES = ("rk4_renormalised", "rkmk54", "rk8_renormalised")  # rkmk2 was the cheapest in no flight
+DIVISORS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32)  # steps in a communication step
+MARGIN = 1.1  # accuracy over the error, for the error of the reference
+GAIN = 2  # largest excess of the observed order over that of the method
 
 
 class OwnFlight:
@@ -53,6 +60,36 @@ class OwnFlight:
         except DivergedError as error:
             return Quantity(self._flights[0].vehicle, str(error), math.inf, 0.0)
         return worst_of(q for part in parts for q in differences_of_all(self._flights, part.flights, part.spans))
+
+    def cheapest(self, names: Iterable[str], accuracy: float) -> Point:
+        """Return the solver of least work that meets the accuracy with the margin, or if none does, without.
+
+        Args:
+            names: names of the integrators.
+            accuracy: largest error.
+
+        Raises:
+            ConfigError: no solver meets the accuracy.
+        """
+        longest = min(plant.longest_step(vehicle) for vehicle in self._scene.each_vehicle)
+        candidates = []
+        for method in map(integrators.get, names):
+            name, per_step = method.__name__.rpartition(".")[2], getattr(method, "EVALUATIONS", None)
+            candidates += [
+                Point(name, method.ORDER, "s", step, math.inf, math.nan, per_step and n * per_step, {})
+                for n in DIVISORS
+                if (step := self.interval / n) <= longest
+            ]
+        points: list[Point] = []
+        for point in sorted(candidates, key=lambda p: p.work):
+            longer, steps = [p for p in points if p.method == point.method], round(self.interval / point.setting)
+            hopeless = any(p.error * (point.setting / p.setting) ** (p.order + GAIN) > accuracy for p in longer)
+            if hopeless and steps < DIVISORS[-1]:
+                continue
+            points.append(point._replace(error=self.error(point.method, steps).error))
+            if points[-1].error <= accuracy / MARGIN:
+                return points[-1]
+        return cheapest(points, accuracy)
 
 
 def has_known_commands(scene: Scene) -> bool:

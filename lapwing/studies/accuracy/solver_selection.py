@@ -15,7 +15,6 @@ from pathlib import Path
 
 from lapwing.cosim.complete_file import complete_file
 from lapwing.cosim.scene import KeyOrigin, Scene, SceneError
-from lapwing.dynamics import integrators
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.kernels import cache_folder, source_digest
 from lapwing.services.common.schemas.communication_schema import Communication
@@ -29,10 +28,6 @@ from lapwing.studies.accuracy.problem import SolverMethod
 from lapwing.studies.accuracy.work_precision import FINE_ENOUGH, Point, cheapest, measure
 
 CANDIDATES = ("rkmk2", "rk4_renormalised", "rkmk54", "rk8_renormalised")  # each the cheapest for some system and error
-IN_FLIGHT = CANDIDATES[1:]  # for a flight of multirotors; rkmk2 was the cheapest in none, and compiles for seconds
-MARGIN = 1.1  # accuracy over the error in the scene's own flight, for the error of the reference
-DIVISORS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32)  # steps per communication step in the own flight
-GAIN = 2  # largest excess of the observed order over that of the method
 IMPACT_SHARE = 3e-3  # of the accuracy, because an impact amplifies position errors to 300 times larger velocity errors
 JUMP_SHARE = 0.125  # of the accuracy while voltages jump, because the largest error of such flights is 7 times larger
 MOST_STEPS = 32  # per communication step, half of those of the reference: the finest step that is tried
@@ -75,7 +70,7 @@ def _for_own_flight(scene: Scene, accuracy: float, notify: Callable[[str], None]
     if not own_flight.has_known_commands(scene):
         return None
     first, reference = scene.each_vehicle[0], own_flight.reference_config(scene, accuracy)
-    path = _cache_file(first, _names(first, IN_FLIGHT), f"{accuracy!r} {reference.resolved!r}")
+    path = _cache_file(first, _names(first, own_flight.CANDIDATES), f"{accuracy!r} {reference.resolved!r}")
     if path and path.is_file():
         with suppress(OSError, ValueError):
             method, step = json.loads(path.read_text(encoding="utf-8"))
@@ -86,34 +81,9 @@ def _for_own_flight(scene: Scene, accuracy: float, notify: Callable[[str], None]
     except ValueError:
         _store(path, json.dumps(["", 0.0]))
         return None
-    selected = _cheapest_in(flight, first, accuracy)
+    selected = flight.cheapest(_names(first, own_flight.CANDIDATES), accuracy)
     _store(path, json.dumps([selected.method, selected.setting]))
     return selected.method, selected.setting
-
-
-def _cheapest_in(flight: own_flight.OwnFlight, scene: Scene, accuracy: float) -> Point:
-    """Return the point of least work that meets the accuracy in a flight with the margin, or if none does, without.
-
-    Raises:
-        ConfigError: no point meets the accuracy.
-    """
-    candidates = []
-    for name in _names(scene, IN_FLIGHT):
-        method = integrators.get(name)
-        per_step = getattr(method, "EVALUATIONS", None)
-        for n in (n for n in DIVISORS if flight.interval / n <= plant.longest_step(scene)):
-            evaluations = per_step and n * per_step
-            candidates.append(Point(name, method.ORDER, "s", flight.interval / n, math.inf, math.nan, evaluations, {}))
-    points: list[Point] = []
-    for point in sorted(candidates, key=lambda p: p.work):
-        longer, steps = [p for p in points if p.method == point.method], round(flight.interval / point.setting)
-        hopeless = any(p.error * (point.setting / p.setting) ** (p.order + GAIN) > accuracy for p in longer)
-        if hopeless and steps < DIVISORS[-1]:
-            continue
-        points.append(point._replace(error=flight.error(point.method, steps).error))
-        if points[-1].error <= accuracy / MARGIN:
-            return points[-1]
-    return cheapest(points, accuracy)
 
 
 def _for_manoeuvres(scene: Scene, accuracy: float, notify: Callable[[str], None]) -> tuple[str, float]:

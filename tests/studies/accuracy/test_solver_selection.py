@@ -16,7 +16,7 @@ from lapwing.cosim.scene import SceneError
 from lapwing.services.common.schemas.run_schema import Run
 from lapwing.services.plant.schema import Solver, method
 from lapwing.services.scene_resolver import load
-from lapwing.studies.accuracy import flight_accuracy, integrate, scenes, solver_selection
+from lapwing.studies.accuracy import flight_accuracy, integrate, own_flight, scenes, solver_selection
 from lapwing.studies.accuracy.state_errors import Quantity
 from lapwing.studies.accuracy.work_precision import Point
 
@@ -51,13 +51,13 @@ def measured_titles(monkeypatch, tmp_path):
     return calls
 
 
-class StubFlight:
+class StubFlight(own_flight.OwnFlight):
     """Own flight in which RK4 has errors of fourth order, and others none that meets 1e-9 with a step of 4 ms."""
 
     calls: ClassVar[list] = []
-    interval = 0.004
 
     def __init__(self, scene, reference):
+        self._scene, self.interval = scene, 0.004
         if scene[Run].duration > 100.0:
             raise ValueError("too long")
 
@@ -68,7 +68,7 @@ class StubFlight:
 
 
 @pytest.fixture
-def own_flight(measured_titles, monkeypatch):
+def flown(measured_titles, monkeypatch):
     """Replace the own flight by a stub. Return its calls."""
     monkeypatch.setattr(solver_selection.own_flight, "has_known_commands", lambda scene: True)
     monkeypatch.setattr(solver_selection.own_flight, "OwnFlight", StubFlight)
@@ -83,18 +83,18 @@ def own_flight(measured_titles, monkeypatch):
         (1.3e-7, "rk8_renormalised", 1), (1e-9, "rk8_renormalised", 2),
     ],
 )  # fmt: skip
-def test_cheapest_solver_of_the_own_flight_is_selected(accuracy, method, steps, own_flight):
+def test_cheapest_solver_of_the_own_flight_is_selected(accuracy, method, steps, flown):
     """Steps are whole fractions of a communication step, not only halves; hopeless ones are not flown."""
     scene = load("hover", [f"solver.accuracy={accuracy}"])
     expected = [f'solver.integrator="{method}"', f"solver.step={0.004 / steps!r}"]
     assert solver_selection.overrides(scene, lambda text: None) == expected
-    number = len(own_flight)
+    number = len(flown)
     assert number <= 6
     assert solver_selection.overrides(scene, lambda text: None) == expected
-    assert len(own_flight) == number  # from the cache
+    assert len(flown) == number  # from the cache
 
 
-def test_own_flight_uses_the_integrator_of_the_scene_and_refuses_what_it_misses(own_flight):
+def test_own_flight_uses_the_integrator_of_the_scene_and_refuses_what_it_misses(flown):
     scene = ["solver.integrator=rk4_renormalised", "solver.accuracy"]
     assert solver_selection.overrides(load("hover", [scene[0], f"{scene[1]}=2e-7"]), lambda text: None)[1] == (
         f"solver.step={0.004 / 3!r}"
@@ -105,11 +105,11 @@ def test_own_flight_uses_the_integrator_of_the_scene_and_refuses_what_it_misses(
         solver_selection.overrides(load("hover", [scene[0], f"{scene[1]}=1e-12"]), lambda text: None)
 
 
-def test_long_flight_selects_by_manoeuvres(own_flight, measured_titles):
+def test_long_flight_selects_by_manoeuvres(flown, measured_titles):
     scene = load("hover", ["solver.accuracy=1e-4", "run.duration=1000"])
     assert solver_selection.overrides(scene, lambda text: None)
     assert len(measured_titles) == 3
-    assert not own_flight
+    assert not flown
 
 
 @pytest.mark.parametrize(
