@@ -13,7 +13,7 @@ from lapwing.services.plant.schema import LEAST_ACCURACIES
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.accuracy import plant
 from lapwing.studies.accuracy.open_loop import fly_parts, starts_of_parts
-from lapwing.studies.accuracy.state_errors import TOPICS, Quantity, differences_of_all, worst_of
+from lapwing.studies.accuracy.state_errors import TOPICS, differences_of_all, worst_of
 from lapwing.studies.accuracy.work_precision import Point, cheapest
 from lapwing.studies.simulate import fly_with_ports
 
@@ -23,23 +23,24 @@ STRICTEST = LEAST_ACCURACIES["ground_contact"]  # limit of the accuracy in conta
 LONGEST = 200.0  # [s] of all vehicles together
 CANDIDATES = ("rk4_renormalised", "rkmk54", "rk8_renormalised")  # rkmk2 was the cheapest in no flight
 DIVISORS = (1, 2, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32)  # steps in a communication step
-MARGIN = 1.1  # accuracy over the error, for the error of the reference
+MARGIN = 1.1  # accuracy over the error, for random numbers and a closed loop that differ from the reference's
 GAIN = 2  # largest excess of the observed order over that of the method
 
 
 class OwnFlight:
     """Flight of a scene with the reference solver."""
 
-    def __init__(self, scene: Scene, reference: RunConfig):
+    def __init__(self, scene: Scene, accuracy: float):
         """Fly the scene.
 
         Args:
             scene: scene with known commands, see `has_known_commands`.
-            reference: its `reference_config`.
+            accuracy: its smallest `solver.accuracy`.
 
         Raises:
             ValueError: the flight fails, or does not end within `LONGEST`.
         """
+        reference = reference_config(scene, accuracy)
         self._scene, self.interval = scene, reference.interval
         most = round(LONGEST / len(scene.each_vehicle) / self.interval)
         flights, diagram = fly_with_ports(reference._replace(last_tick=min(reference.last_tick, most)), TOPICS)
@@ -48,18 +49,24 @@ class OwnFlight:
         if most < reference.last_tick and not diagram.ended:
             raise ValueError(f"{scene.path}: longer than {LONGEST:g} s")
         self._flights, self._diagram, self._starts = flights, diagram, starts_of_parts(diagram)
+        self._uncertainty = self._difference(reference_config(scene, accuracy, FINEST // 2))  # of the reference
 
-    def error(self, integrator: str, steps: int) -> Quantity:
-        """Return the largest error of an integrator with `steps` in a communication step, in parts of the flight.
+    def error(self, integrator: str, steps: int) -> float:
+        """Return a bound of the error of an integrator with `steps` in a communication step, in parts of the flight.
 
-        It is infinite if the state becomes invalid.
+        It includes the difference of the reference from itself with half as many steps, because a kink in a force
+        reduces the order. It is infinite if the state becomes invalid.
         """
-        config = _config(self._scene, integrator, steps)._replace(last_tick=self._diagram.tick - 1)
+        return self._difference(_config(self._scene, integrator, steps)) + self._uncertainty
+
+    def _difference(self, config: RunConfig) -> float:
+        """Return the largest difference of another solver from the reference."""
+        config = config._replace(last_tick=self._diagram.tick - 1)
         try:
             parts = fly_parts(self._diagram, self._starts, config, TOPICS)
-        except DivergedError as error:
-            return Quantity(self._flights[0].vehicle, str(error), math.inf, 0.0)
-        return worst_of(q for part in parts for q in differences_of_all(self._flights, part.flights, part.spans))
+        except DivergedError:
+            return math.inf
+        return worst_of(q for part in parts for q in differences_of_all(self._flights, part.flights, part.spans)).error
 
     def cheapest(self, names: Iterable[str], accuracy: float) -> Point:
         """Return the solver of least work that meets the accuracy with the margin, or if none does, without.
@@ -86,7 +93,7 @@ class OwnFlight:
             hopeless = any(p.error * (point.setting / p.setting) ** (p.order + GAIN) > accuracy for p in longer)
             if hopeless and steps < DIVISORS[-1]:
                 continue
-            points.append(point._replace(error=self.error(point.method, steps).error))
+            points.append(point._replace(error=self.error(point.method, steps)))
             if points[-1].error <= accuracy / MARGIN:
                 return points[-1]
         return cheapest(points, accuracy)
@@ -102,9 +109,9 @@ def has_known_commands(scene: Scene) -> bool:
     )
 
 
-def reference_config(scene: Scene, accuracy: float) -> RunConfig:
+def reference_config(scene: Scene, accuracy: float, steps: int = FINEST) -> RunConfig:
     """Return the run configuration of a scene with the reference solver for an accuracy."""
-    return _config(scene, REFERENCE, FINEST, f"solver.accuracy={max(STRICTER * accuracy, STRICTEST)!r}")
+    return _config(scene, REFERENCE, steps, f"solver.accuracy={max(STRICTER * accuracy, STRICTEST)!r}")
 
 
 def _config(scene: Scene, integrator: str, steps: int, *more: str) -> RunConfig:

@@ -69,15 +69,16 @@ def _for_own_flight(scene: Scene, accuracy: float, notify: Callable[[str], None]
     """
     if not own_flight.has_known_commands(scene):
         return None
-    first, reference = scene.each_vehicle[0], own_flight.reference_config(scene, accuracy)
-    path = _cache_file(first, _names(first, own_flight.CANDIDATES), f"{accuracy!r} {reference.resolved!r}")
+    first = scene.each_vehicle[0]
+    more = f"{accuracy!r} {own_flight.reference_config(scene, accuracy).resolved!r}"
+    path = _cache_file(first, _names(first, own_flight.CANDIDATES), more)
     if path and path.is_file():
         with suppress(OSError, ValueError):
             method, step = json.loads(path.read_text(encoding="utf-8"))
             return (str(method), float(step)) if method else None
     notify("flying the scene with each integrator for solver.accuracy (first time only)")
     try:
-        flight = own_flight.OwnFlight(scene, reference)
+        flight = own_flight.OwnFlight(scene, accuracy)
     except ValueError:
         _store(path, json.dumps(["", 0.0]))
         return None

@@ -17,7 +17,6 @@ from lapwing.services.common.schemas.run_schema import Run
 from lapwing.services.plant.schema import Solver, method
 from lapwing.services.scene_resolver import load
 from lapwing.studies.accuracy import flight_accuracy, integrate, own_flight, scenes, solver_selection
-from lapwing.studies.accuracy.state_errors import Quantity
 from lapwing.studies.accuracy.work_precision import Point
 
 ROOT = Path(__file__).parents[3]
@@ -56,7 +55,7 @@ class StubFlight(own_flight.OwnFlight):
 
     calls: ClassVar[list] = []
 
-    def __init__(self, scene, reference):
+    def __init__(self, scene, accuracy):
         self._scene, self.interval = scene, 0.004
         if scene[Run].duration > 100.0:
             raise ValueError("too long")
@@ -64,7 +63,7 @@ class StubFlight(own_flight.OwnFlight):
     def error(self, name, steps):
         self.calls.append((name, steps))
         size = {"rk4_renormalised": 1e-5, "rkmk54": 4e-6, "rk8_renormalised": 1e-8}[name]
-        return Quantity("drone1", "position", size / steps ** integrate.integrators.get(name).ORDER, 0.0)
+        return size / steps ** integrate.integrators.get(name).ORDER
 
 
 @pytest.fixture
