@@ -3,7 +3,7 @@
     python -m benchmarks.solver_choice [--first N] [--count N]
 
 Every candidate repeats the commands that the scene's own flight recorded with the reference (rkmk54, 64 steps in a
-communication step). docs/appendix/experiments.md has the figures of the first scenes.
+communication step), which is not that of the choice. docs/appendix/experiments.md has the figures.
 """
 
 import math
@@ -19,9 +19,10 @@ from lapwing.dynamics import integrators
 from lapwing.services.common.schemas.communication_schema import Communication
 from lapwing.services.plant.schema import Solver
 from lapwing.services.scene_resolver import load, parse, resolve
-from lapwing.studies.accuracy.open_loop import fly_parts
+from lapwing.studies.accuracy.open_loop import fly_parts, starts_of_parts
+from lapwing.studies.accuracy.own_flight import DIVISORS
 from lapwing.studies.accuracy.scenes import FINEST
-from lapwing.studies.accuracy.solver_selection import CANDIDATES, MOST_STEPS, overrides
+from lapwing.studies.accuracy.solver_selection import CANDIDATES, overrides
 from lapwing.studies.accuracy.state_errors import TOPICS, differences_of_all, worst_of
 from lapwing.studies.simulate import fly_with_ports
 
@@ -61,10 +62,9 @@ def draw(seed: int) -> Scene:
     ])  # fmt: skip
 
 
-def solvers(interval: float) -> list[tuple[str, int]]:
+def solvers() -> list[tuple[str, int]]:
     """Return (integrator, steps in a communication step) of all candidates, by the evaluations that they need."""
-    steps = [2**k for k in range(round(math.log2(MOST_STEPS)) + 1)]
-    return sorted(((name, n) for name in CANDIDATES for n in steps), key=work)
+    return sorted(((name, n) for name in CANDIDATES for n in DIVISORS), key=work)
 
 
 def work(solver: tuple[str, int]) -> int:
@@ -104,15 +104,16 @@ def measure(seed: int) -> tuple[float, float] | None:
     flights, diagram = fly_with_ports(with_solver("rkmk54", FINEST, max(1e-3 * accuracy, 4e-10)), TOPICS)
     if flights[0].failure:
         raise ValueError(f"scene {seed}: {flights[0].failure}")
+    starts = starts_of_parts(diagram)
 
     def error_of(solver: tuple[str, int]):
         config = with_solver(*solver, accuracy)._replace(last_tick=diagram.tick - 1)
-        parts = fly_parts(diagram, config, TOPICS, lambda _: None)
+        parts = fly_parts(diagram, starts, config, TOPICS)
         return worst_of(q for part in parts for q in differences_of_all(flights, part.flights, part.spans))
 
     own = chosen[Solver].integrator, chosen[Solver].steps(chosen[Communication])
     got = error_of(own)
-    cheapest = next(s for s in solvers(interval) if s == own or (work(s) < work(own) and error_of(s).error <= accuracy))
+    cheapest = next(s for s in solvers() if s == own or (work(s) < work(own) and error_of(s).error <= accuracy))
     ratio, cost = accuracy / got.error, work(own) / work(cheapest)
     texts = [f"{name} / {n}" for name, n in (own, cheapest)]
     numbers = f"{seed:5d} {accuracy:8.1e} {got.error:8.1e} {ratio:8.2g} {cost:5.2f}"

@@ -22,7 +22,7 @@ from lapwing.services.common.schemas.communication_schema import Communication, 
 from lapwing.services.common.schemas.run_schema import Run
 from lapwing.services.plant.schema import Solver
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.studies.accuracy.open_loop import Parts, fly_parts, inputs_of_plant
+from lapwing.studies.accuracy.open_loop import Parts, Start, fly_parts, inputs_of_plant, starts_of_parts
 from lapwing.studies.accuracy.plant import longest_step
 from lapwing.studies.simulate import fly_each, fly_with_ports
 
@@ -73,10 +73,10 @@ def errors(scene: Scene) -> list[ErrorSource]:
         step = interval / max(REFERENCE_STEPS, factor)
         return ["solver.integrator=rkmk4", f"solver.step={step!r}", f"solver.accuracy={accuracy!r}"]
 
-    def updated(diagram: BlockDiagram, factor: int) -> tuple[Parts, Parts]:
+    def updated(diagram: BlockDiagram, starts: list[Start], factor: int) -> tuple[Parts, Parts]:
         settings = [*base, *rate_overrides(scene, rate * factor), *fine_solver(factor)]
         config = resolve(load(scene.path, settings))
-        return fly_parts(diagram, config._replace(last_tick=factor * diagram.tick - 1), (TRUTH,), lambda _: None)
+        return fly_parts(diagram, starts, config._replace(last_tick=factor * diagram.tick - 1), (TRUTH,))
 
     coupling = scene[Communication].coupling
     parts = []
@@ -103,9 +103,10 @@ def errors(scene: Scene) -> list[ErrorSource]:
     _, diagram = fly_with_ports(resolve(load(scene.path, [*base, *fine_solver(1)])), (TRUTH,))
     if inputs_of_plant(diagram):
         source = "neighbours" if acting_on_neighbours(scene) else SOURCES[4]
-        reference, _ = updated(diagram, REFERENCE_RATE)
+        starts = starts_of_parts(diagram)
+        reference, _ = updated(diagram, starts, REFERENCE_RATE)
         for factor in RATE_FACTORS:
-            one, _ = updated(diagram, factor)
+            one, _ = updated(diagram, starts, factor)
             label = f"updates at {rate * factor} Hz"
             parts.append(_error_source(source, interval / factor, label, one.flights, reference.flights))
     return parts

@@ -23,7 +23,7 @@ from lapwing.services.plant.schema import LEAST_ACCURACIES, Solver
 from lapwing.services.process_table import foreign_firmware
 from lapwing.services.scene_resolver import from_resolved, load, resolve
 from lapwing.studies.accuracy.error_budget import rate_overrides
-from lapwing.studies.accuracy.open_loop import PART_LENGTH, Parts, fly_parts, inputs_of_plant
+from lapwing.studies.accuracy.open_loop import PART_LENGTH, Parts, fly_parts, inputs_of_plant, starts_of_parts
 from lapwing.studies.accuracy.sensitivity import Signal, first_signal, start_difference, with_start_shifted
 from lapwing.studies.accuracy.state_errors import TOPICS, Quantity, differences_of_all, worst_of
 from lapwing.studies.simulate import fly_with_ports
@@ -202,10 +202,12 @@ def _in_parts(
 ) -> tuple[list[Quantity], list[Quantity]]:
     """Return the largest errors of a flight in parts with finer steps, and those of them with more updates."""
 
+    starts = starts_of_parts(coarse.diagram)
+
     def fly(config: RunConfig, what: str) -> tuple[Parts, Parts]:
         text = f"{name}, {what} of {PART_LENGTH:g} s"
         result: tuple[Parts, Parts] = progress(
-            finer, text, lambda show: fly_parts(coarse.diagram, config, TOPICS, show)
+            finer, text, lambda show: fly_parts(coarse.diagram, starts, config, TOPICS, show)
         )
         return result
 

@@ -7,8 +7,8 @@ are data, so neither decisions of an autopilot nor the resolution of sensors hav
 be shorter than the recorded ones; each recorded command then acts as long as before.
 """
 
-from collections.abc import Callable
-from typing import NamedTuple
+from collections.abc import Callable, Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -31,6 +31,14 @@ class Parts(NamedTuple):
     spans: list[tuple[float, float]]  # [s] intervals to measure: second halves of the parts, end exclusive
 
 
+class Start(NamedTuple):
+    """State of a plant before a tick."""
+
+    tick: int
+    states: list[Any]  # of each compiled block
+    rows: list[tuple[str, int, np.ndarray]]  # (port, ticks back, row) of the outputs that blocks read with a delay
+
+
 class _Plant(NamedTuple):
     """Plant of a run, with recorded inputs."""
 
@@ -46,13 +54,31 @@ def inputs_of_plant(flight: BlockDiagram) -> list[str]:
     return [name for name in names if name not in own and flight.ports[name].period != LATCHED]
 
 
+def starts_of_parts(flight: BlockDiagram) -> list[Start]:
+    """Return the states at which the parts of a run begin.
+
+    Args:
+        flight: block diagram at the end of the run, with the full history of all ports.
+    """
+    recorded, result = _plant(flight, flight.config), []
+    for tick in range(0, flight.tick, _half(flight)):
+        recorded.diagram.advance(tick)
+        result.append(_start(recorded, tick))
+    return result
+
+
 def fly_parts(
-    flight: BlockDiagram, finer: RunConfig, topics: tuple[Topic, ...], observe: Callable[[int], None]
+    flight: BlockDiagram,
+    starts: Sequence[Start],
+    finer: RunConfig,
+    topics: tuple[Topic, ...],
+    observe: Callable[[int], None] = lambda tick: None,
 ) -> tuple[Parts, Parts]:
     """Repeat a run in parts, from its recorded states and under its recorded commands.
 
     Args:
         flight: block diagram at the end of the run, with the full history of all ports.
+        starts: its `starts_of_parts`.
         finer: its configuration with another solver, and communication steps of the same length or whole fractions.
         topics: topics of the plant to return for each vehicle.
         observe: called with each recorded tick at which a part begins.
@@ -60,24 +86,27 @@ def fly_parts(
     Returns:
         Two series of parts, whose spans together cover the run.
     """
-    recorded, *replicas = (_plant(flight, config) for config in (flight.config, finer, finer))
+    replicas = [_plant(flight, finer) for _ in range(2)]
     interval = flight.config.interval
     updates = round(interval / finer.interval)
-    half = max(1, round(0.5 * PART_LENGTH / interval))
     spans: tuple[list[tuple[float, float]], ...] = ([], [])
-    for number, start in enumerate(range(0, flight.tick, half)):
-        stop = min(start + half, flight.tick)
-        observe(start)
-        _restart(replicas[number % 2], recorded, start, updates)
-        recorded.diagram.advance(stop)
+    for number, start in enumerate(starts):
+        stop = min(start.tick + _half(flight), flight.tick)
+        observe(start.tick)
+        _restart(replicas[number % 2], start, updates)
         for plant in replicas:
             plant.diagram.advance((stop - 1) * updates + 1)
-        spans[1 - number % 2].append(((start - 0.5) * interval, (stop - 0.5) * interval))
+        spans[1 - number % 2].append(((start.tick - 0.5) * interval, (stop - 0.5) * interval))
     one, other = (
         Parts(FlightData.of_each(plant.diagram, topics), list(span))
         for plant, span in zip(replicas, spans, strict=True)
     )
     return one, other
+
+
+def _half(flight: BlockDiagram) -> int:
+    """Return the ticks in half of a part."""
+    return max(1, round(0.5 * PART_LENGTH / flight.config.interval))
 
 
 def _plant(flight: BlockDiagram, config: RunConfig) -> _Plant:
@@ -102,20 +131,29 @@ def _plant(flight: BlockDiagram, config: RunConfig) -> _Plant:
     return _Plant(diagram, service)
 
 
-def _restart(plant: _Plant, recorded: _Plant, tick: int, updates: int) -> None:
-    """Set the state of a plant before a recorded `tick` to that of another one with the same blocks.
+def _start(recorded: _Plant, tick: int) -> Start:
+    """Return the state of a plant before `tick`.
 
-    The plant has `updates` communication steps in one of the recorded ones. The state includes outputs of previous
-    ticks, through which vehicles of a fleet act on each other.
+    It includes outputs of previous ticks, through which vehicles of a fleet act on each other.
     """
-    for own, other in zip(plant.service.blocks, recorded.service.blocks, strict=True):
-        if isinstance(own, Block):
-            state = read(other.state)
-            if hasattr(state, "last"):  # last tick of the run
-                state = state._replace(last=(state.last + 1) * updates - 1)
-            write(own.state, state)
-    outputs = {port.name for block in plant.service.blocks for port in block.outputs}
-    first = (tick - 1) * updates + 1  # a step of the flight ends at its tick, which is that of its last update
-    for delayed in {i for block in plant.service.blocks for i in getattr(block, "inputs", ()) if i.port in outputs}:
-        for back in range(1, min(tick, delayed.delay) + 1):
-            plant.diagram.put_row(delayed.port, first - back, recorded.diagram.row(delayed.port, tick - back))
+    blocks = recorded.service.blocks
+    states = [read(block.state) for block in blocks if isinstance(block, Block)]
+    outputs = {port.name for block in blocks for port in block.outputs}
+    delayed = {i for block in blocks for i in getattr(block, "inputs", ()) if i.port in outputs}
+    rows = [
+        (i.port, back, recorded.diagram.row(i.port, tick - back).copy())
+        for i in delayed
+        for back in range(1, min(tick, i.delay) + 1)
+    ]
+    return Start(tick, states, rows)
+
+
+def _restart(plant: _Plant, start: Start, updates: int) -> None:
+    """Set the state of a plant, with `updates` communication steps in one of the recorded ones."""
+    for block, state in zip([p for p in plant.service.blocks if isinstance(p, Block)], start.states, strict=True):
+        if hasattr(state, "last"):  # last tick of the run
+            state = state._replace(last=(state.last + 1) * updates - 1)
+        write(block.state, state)
+    first = (start.tick - 1) * updates + 1  # a step of the flight ends at its tick, which is that of its last update
+    for port, back, row in start.rows:
+        plant.diagram.put_row(port, first - back, row)

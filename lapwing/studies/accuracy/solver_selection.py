@@ -1,6 +1,8 @@
 """`[solver] accuracy`: cheapest integrator and step for a scene, from cached measurements.
 
-The choice counts evaluations of the right-hand side, so it is a function of the scene and the version alone.
+The solvers repeat the commands that the scene's own flight records. If it has commands from outside, fails or is long,
+they fly manoeuvres instead, which are harder than most flights. The choice counts evaluations of the right-hand side,
+so it is a function of the scene and the version alone.
 """
 
 import hashlib
@@ -13,7 +15,6 @@ from pathlib import Path
 
 from lapwing.cosim.complete_file import complete_file
 from lapwing.cosim.scene import KeyOrigin, Scene, SceneError
-from lapwing.dynamics import integrators
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.kernels import cache_folder, source_digest
 from lapwing.services.common.schemas.communication_schema import Communication
@@ -21,7 +22,7 @@ from lapwing.services.common.schemas.run_schema import Run
 from lapwing.services.common.schemas.vehicle_schema import Effects, Vehicle
 from lapwing.services.plant.schema import Solver, accuracy_to_select_for
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.studies.accuracy import flight_accuracy, plant, scenes
+from lapwing.studies.accuracy import flight_accuracy, own_flight, plant, scenes
 from lapwing.studies.accuracy.error_budget import acting_on_neighbours
 from lapwing.studies.accuracy.problem import SolverMethod
 from lapwing.studies.accuracy.work_precision import FINE_ENOUGH, Point, cheapest, measure
@@ -30,6 +31,7 @@ CANDIDATES = ("rkmk2", "rk4_renormalised", "rkmk54", "rk8_renormalised")  # each
 IMPACT_SHARE = 3e-3  # of the accuracy, because an impact amplifies position errors to 300 times larger velocity errors
 JUMP_SHARE = 0.125  # of the accuracy while voltages jump, because the largest error of such flights is 7 times larger
 MOST_STEPS = 32  # per communication step, half of those of the reference: the finest step that is tried
+SOURCES = "dynamics", "services"  # packages of which all modules decide on a measurement
 HIDDEN = 2.0  # factor by which a finer step errs more if the longer one is under error control
 
 
@@ -48,18 +50,59 @@ def overrides(scene: Scene, notify: Callable[[str], None]) -> list[str]:
     accuracy = accuracy_to_select_for(scene)
     if accuracy is None:
         return []
-    distinct = {repr(scenes.physics(vehicle)): vehicle for vehicle in scene.each_vehicle}.values()
     try:
-        selected = cheapest(
-            _combine_vehicles([_expected_points(vehicle, accuracy, notify) for vehicle in distinct]), accuracy
-        )
+        method, step = _for_own_flight(scene, accuracy, notify) or _for_manoeuvres(scene, accuracy, notify)
     except ConfigError as error:
         message = f"{accuracy:g}: {error.message}"
         raise SceneError("solver.accuracy", message, source=KeyOrigin(scene.path)) from None
     # exact step that `Solver.check` accepts as a divisor of the communication step
-    chosen = [f'solver.integrator="{selected.method}"', f"solver.step={selected.setting!r}"]
+    chosen = [f'solver.integrator="{method}"', f"solver.step={step!r}"]
     _warn_of_neighbours(scene, chosen, accuracy, notify)
     return chosen
+
+
+def _for_own_flight(scene: Scene, accuracy: float, notify: Callable[[str], None]) -> tuple[str, float] | None:
+    """Return (integrator, step [s]) for the scene's own flight; None if it has no known commands, fails or is long.
+
+    Raises:
+        ConfigError: no integrator meets the accuracy.
+    """
+    if not own_flight.has_known_commands(scene):
+        return None
+    first = scene.each_vehicle[0]
+    more = f"{accuracy!r} {own_flight.reference_config(scene, accuracy).resolved!r}"
+    path = _cache_file(first, _names(first, own_flight.CANDIDATES), more)
+    if path and path.is_file():
+        with suppress(OSError, ValueError):
+            method, step = json.loads(path.read_text(encoding="utf-8"))
+            return (str(method), float(step)) if method else None
+    notify("flying the scene with each integrator for solver.accuracy (first time only)")
+    try:
+        flight = own_flight.OwnFlight(scene, accuracy)
+    except ValueError:
+        _store(path, json.dumps(["", 0.0]))
+        return None
+    selected = flight.cheapest(_names(first, own_flight.CANDIDATES), accuracy)
+    _store(path, json.dumps([selected.method, selected.setting]))
+    return selected.method, selected.setting
+
+
+def _for_manoeuvres(scene: Scene, accuracy: float, notify: Callable[[str], None]) -> tuple[str, float]:
+    """Return (integrator, step [s]) for manoeuvres of each vehicle in free flight.
+
+    Raises:
+        ConfigError: no integrator meets the accuracy.
+    """
+    distinct = {repr(scenes.physics(vehicle)): vehicle for vehicle in scene.each_vehicle}.values()
+    points = _combine_vehicles([_expected_points(vehicle, accuracy, notify) for vehicle in distinct])
+    selected = cheapest(points, accuracy)
+    return selected.method, selected.setting
+
+
+def _names(scene: Scene, candidates: tuple[str, ...] = CANDIDATES) -> tuple[str, ...]:
+    """Return the names of the integrators from which one is selected."""
+    solver = scene[Solver]
+    return (solver.integrator,) if "integrator" in solver.model_fields_set else candidates
 
 
 def _warn_of_neighbours(scene: Scene, chosen: list[str], accuracy: float, notify: Callable[[str], None]) -> None:
@@ -90,8 +133,7 @@ def _combine_vehicles(vehicles: list[list[Point]]) -> list[Point]:
 
 def _expected_points(scene: Scene, accuracy: float, notify: Callable[[str], None]) -> list[Point]:
     """Return the points of one vehicle with the largest errors expected in flight."""
-    solver = scene[Solver]
-    names = (solver.integrator,) if "integrator" in solver.model_fields_set else CANDIDATES
+    names = _names(scene)
     gentle, *others = (
         [p for p in points if p.method in names or len(names) > 1] for points in _points(scene, names, notify)
     )
@@ -175,12 +217,9 @@ def _cache_file(scene: Scene, names: tuple[str, ...], more: str = "") -> Path | 
     folder = cache_folder()
     if folder is None:
         return None
-    modules = [
-        __name__,
-        f"lapwing.services.plant.models.{scene[Vehicle].model}",
-        *(f"lapwing.dynamics.integrators.{name}" for name in integrators.names()),
-        *(f"lapwing.dynamics.effects.{name}" for name in scene[Effects].tables),
-    ]
+    root = Path(__file__).parents[2]
+    files = [file.relative_to(root) for part in SOURCES for file in sorted((root / part).rglob("*.py"))]
+    modules = [__name__, *(".".join(("lapwing", *file.with_suffix("").parts)) for file in files)]
     digest = hashlib.blake2b(source_digest(modules).encode(), digest_size=8)
     run, manoeuvres = scene[Run], [voltages.__name__ for voltages in plant.MANOEUVRES]
     flight = names, manoeuvres, run.seed, scene[Vehicle].name, run.duration, scene[Communication].rate

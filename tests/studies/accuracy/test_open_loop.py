@@ -11,7 +11,7 @@ from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.services.common.ports import ImuReading, TrueState
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.accuracy import open_loop
-from lapwing.studies.accuracy.open_loop import fly_parts, inputs_of_plant
+from lapwing.studies.accuracy.open_loop import fly_parts, inputs_of_plant, starts_of_parts
 from lapwing.studies.accuracy.sensitivity import first_signal, with_start_shifted
 from lapwing.studies.accuracy.state_errors import TOPICS, differences
 from lapwing.studies.simulate import fly_with_ports
@@ -28,7 +28,7 @@ def run():
 
 def errors(run, finer):
     flights, diagram = run
-    parts = fly_parts(diagram, finer, TOPICS, lambda tick: None)
+    parts = fly_parts(diagram, starts_of_parts(diagram), finer, TOPICS)
     return [q for part in parts for q in differences(flights[0], part.flights[0], part.spans)]
 
 
@@ -40,7 +40,8 @@ def test_more_updates_of_the_plant_change_only_what_it_holds(run):
     """Each command acts as long as before: without held quantities the parts are equal, except for round-off."""
     finer = config_of(0.000125)
     faster = config_of(0.000125, "communication.rate=2000")._replace(last_tick=8 * run[1].tick - 1)
-    series = [fly_parts(run[1], config, TOPICS, lambda tick: None) for config in (finer, faster)]
+    starts = starts_of_parts(run[1])
+    series = [fly_parts(run[1], starts, config, TOPICS) for config in (finer, faster)]
     held = [q for a, b in zip(*series, strict=True) for q in differences(a.flights[0], b.flights[0], a.spans)]
     assert {"position", "attitude", "velocity", "body rates", "rotor speed"} <= {q.name for q in held}
     assert max(q.error for q in held) < 1e-5
@@ -48,7 +49,7 @@ def test_more_updates_of_the_plant_change_only_what_it_holds(run):
 
 def test_spans_cover_each_tick_once(run):
     flights, diagram = run
-    one, other = fly_parts(diagram, diagram.config, TOPICS, lambda tick: None)
+    one, other = fly_parts(diagram, starts_of_parts(diagram), diagram.config, TOPICS)
     times = flights[0].truth.times
     counts = [sum(a <= t < b for a, b in [*one.spans, *other.spans]) for t in times.tolist()]
     assert counts == [1] * len(times)
@@ -98,7 +99,7 @@ def test_restart_includes_outputs_read_a_tick_later(monkeypatch):
     monkeypatch.setattr(open_loop, "write", lambda cell, value: states.append((cell, value)))
     monkeypatch.setattr(open_loop, "read", lambda cell: cell)
     own, recorded = plant(1.0), plant(2.0)
-    open_loop._restart(own, recorded, 5, 1)
+    open_loop._restart(own, open_loop._start(recorded, 5), 1)
     assert states == [(1.0, 2.0)]
     assert own.diagram.ring("load")[:, 0].tolist() == [1.0, 1.0, 1.0, 1.0, 2.0, 1.0, 1.0, 1.0]
 

@@ -8,13 +8,15 @@ import sys
 import time
 from contextlib import contextmanager
 from pathlib import Path
+from typing import ClassVar
 
 import pytest
 
 from lapwing.cosim.scene import SceneError
+from lapwing.services.common.schemas.run_schema import Run
 from lapwing.services.plant.schema import Solver, method
 from lapwing.services.scene_resolver import load
-from lapwing.studies.accuracy import flight_accuracy, integrate, scenes, solver_selection
+from lapwing.studies.accuracy import flight_accuracy, integrate, own_flight, scenes, solver_selection
 from lapwing.studies.accuracy.work_precision import Point
 
 ROOT = Path(__file__).parents[3]
@@ -38,13 +40,75 @@ def scene(tmp_path, solver):
 
 @pytest.fixture
 def measured_titles(monkeypatch, tmp_path):
-    """Replace measurements by POINTS with an empty cache. Return the titles of the measured problems."""
+    """Replace measurements of manoeuvres by POINTS with an empty cache. Return the titles of the measured problems."""
     calls = []
+    monkeypatch.setattr(solver_selection.own_flight, "has_known_commands", lambda scene: False)
     monkeypatch.setattr(solver_selection, "cache_folder", lambda: tmp_path / "cache")
     monkeypatch.setattr(
         solver_selection, "measure", lambda problem, most, timed: calls.append(problem.title) or list(POINTS)
     )
     return calls
+
+
+class StubFlight(own_flight.OwnFlight):
+    """Own flight in which RK4 has errors of fourth order, and others none that meets 1e-9 with a step of 4 ms."""
+
+    calls: ClassVar[list] = []
+
+    def __init__(self, scene, accuracy):
+        self._scene, self.interval = scene, 0.004
+        if scene[Run].duration > 100.0:
+            raise ValueError("too long")
+
+    def error(self, name, steps):
+        self.calls.append((name, steps))
+        size = {"rk4_renormalised": 1e-5, "rkmk54": 4e-6, "rk8_renormalised": 1e-8}[name]
+        return size / steps ** integrate.integrators.get(name).ORDER
+
+
+@pytest.fixture
+def flown(measured_titles, monkeypatch):
+    """Replace the own flight by a stub. Return its calls."""
+    monkeypatch.setattr(solver_selection.own_flight, "has_known_commands", lambda scene: True)
+    monkeypatch.setattr(solver_selection.own_flight, "OwnFlight", StubFlight)
+    monkeypatch.setattr(StubFlight, "calls", [])
+    return StubFlight.calls
+
+
+@pytest.mark.parametrize(
+    ("accuracy", "method", "steps"),
+    [
+        (2e-5, "rk4_renormalised", 1), (5e-6, "rkmk54", 1), (1e-6, "rk4_renormalised", 2),
+        (1.3e-7, "rk8_renormalised", 1), (1e-9, "rk8_renormalised", 2),
+    ],
+)  # fmt: skip
+def test_cheapest_solver_of_the_own_flight_is_selected(accuracy, method, steps, flown):
+    """Steps are whole fractions of a communication step, not only halves; hopeless ones are not flown."""
+    scene = load("hover", [f"solver.accuracy={accuracy}"])
+    expected = [f'solver.integrator="{method}"', f"solver.step={0.004 / steps!r}"]
+    assert solver_selection.overrides(scene, lambda text: None) == expected
+    number = len(flown)
+    assert number <= 6
+    assert solver_selection.overrides(scene, lambda text: None) == expected
+    assert len(flown) == number  # from the cache
+
+
+def test_own_flight_uses_the_integrator_of_the_scene_and_refuses_what_it_misses(flown):
+    scene = ["solver.integrator=rk4_renormalised", "solver.accuracy"]
+    assert solver_selection.overrides(load("hover", [scene[0], f"{scene[1]}=2e-7"]), lambda text: None)[1] == (
+        f"solver.step={0.004 / 3!r}"
+    )
+    with pytest.raises(
+        SceneError, match=r"1e-12: no method meets this error; the smallest error is 9.5e-12, .* at step 0.000125"
+    ):
+        solver_selection.overrides(load("hover", [scene[0], f"{scene[1]}=1e-12"]), lambda text: None)
+
+
+def test_long_flight_selects_by_manoeuvres(flown, measured_titles):
+    scene = load("hover", ["solver.accuracy=1e-4", "run.duration=1000"])
+    assert solver_selection.overrides(scene, lambda text: None)
+    assert len(measured_titles) == 3
+    assert not flown
 
 
 @pytest.mark.parametrize(
@@ -237,6 +301,22 @@ def hindered(monkeypatch):
             process.kill()
             process.wait()
         os.sched_setaffinity(0, cores)
+
+
+@pytest.mark.long
+def test_selection_for_own_flight_is_equal_on_a_busy_machine(monkeypatch, tmp_path):
+    """It includes the landing, which amplifies errors, and is met in the closed loop."""
+    monkeypatch.setattr(solver_selection, "cache_folder", lambda: tmp_path)
+    scene = load("hover", ["solver.accuracy=1e-6", "run.duration=12"])
+    result = solver_selection.overrides(scene, lambda text: None)
+    (cached,) = (tmp_path / "accuracy").glob("*.json")
+    idle = cached.read_bytes()
+    cached.unlink()
+    with hindered(monkeypatch):
+        assert solver_selection.overrides(scene, lambda text: None) == result
+    assert cached.read_bytes() == idle
+    selected = flight_accuracy.measure(load(scene, result), lambda config, text, work: work(lambda tick: None))
+    assert selected.met
 
 
 @pytest.mark.long
