@@ -58,7 +58,9 @@ class Figure(NamedTuple):
         """Return a question about a value that is far from its estimate; "" for a plausible value."""
         if self._likely(value, guess, self.far):
             return ""
-        return f"{self.name} = {self._far_from(value, guess)}: is that {'right' if self.unit == 'count' else 'the unit'}?"
+        return (
+            f"{self.name} = {self._far_from(value, guess)}: is that {'right' if self.unit == 'count' else 'the unit'}?"
+        )
 
     def check_unit(self, value: float, guess: float) -> None:
         """Raise ConfigError for a number without a unit that is far from its estimate, but near it in another unit."""
