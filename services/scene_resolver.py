@@ -18,9 +18,10 @@ from lapwing.cosim.scene import Overrides, Scene, SceneError, Vocabulary
 from lapwing.services.common import user_modules
 from lapwing.services.common.firmware.schema import FIRMWARES
 from lapwing.services.common.schemas import communication_schema as exchange
-from lapwing.services.common.schemas import environment_schema, mesh_schema, run_schema, success_criteria
+from lapwing.services.common.schemas import environment_schema, fence_schema, mesh_schema, run_schema, success_criteria
 from lapwing.services.common.schemas import vehicle_schema as vehicle
 from lapwing.services.common.schemas.communication_schema import Communication
+from lapwing.services.common.schemas.fence_schema import FenceTable
 from lapwing.services.common.schemas.run_schema import Run
 from lapwing.services.common.schemas.vehicle_schema import Vehicle
 from lapwing.services.plant import models
@@ -54,7 +55,16 @@ def _configurations() -> list[ModuleType]:
 @cache
 def vocabulary() -> Vocabulary:
     """Return all possible scene tables: shared ones, those of services, and those of plant models."""
-    shared = [run_schema, success_criteria, exchange, environment_schema, vehicle, user_modules, mesh_schema]
+    shared = [
+        run_schema,
+        success_criteria,
+        exchange,
+        environment_schema,
+        fence_schema,
+        vehicle,
+        user_modules,
+        mesh_schema,
+    ]
     tables = [*shared, *_configurations(), *map(models.get, models.names())]
     return Vocabulary.of(tables, models.check)
 
@@ -178,9 +188,10 @@ def _resolve(scene: Scene, plans: Mapping[str, tuple[Any, ...]]) -> RunConfig:
             if config is not None:
                 (result if process.lock_step else auxiliary)[process.name] = config
     result = _resolvers()[FMU].connect(scene, result)
-    if plan := plans.get(scene[Vehicle].name):
-        name = next(name for name in (AUTOPILOT, *FIRMWARES) if name in result)
-        result[name] = result[name]._replace(parameters=result[name].parameters._replace(plan=plan))
+    plan = plans.get(scene[Vehicle].name, ())
+    for name in [name for name in (AUTOPILOT, *FIRMWARES) if name in result and (plan or scene.has(FenceTable))]:
+        parameters = fence_schema.with_fence(scene, result[name].parameters, plan)
+        result[name] = result[name]._replace(parameters=parameters)
     return RunConfig(
         scene.name,
         run.title,

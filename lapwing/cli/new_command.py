@@ -24,7 +24,7 @@ ModuleName = Annotated[str, typer.Argument(metavar="NAME", help="name of the mod
 
 @new.command()
 def scene(name: Annotated[str, typer.Argument(metavar="NAME", help="name of the scene, e.g. my_flight")]) -> None:
-    """Create a scene: NAME.toml, a flight over waypoints with comments."""
+    """Create a scene: NAME.toml, over waypoints."""
     typer.echo(write_scene(name, Path()))
 
 

@@ -2,14 +2,14 @@
 
 import math
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from lapwing.cli.new_command import new
-from lapwing.cli.vehicle_measurements import FIGURES, Figure, Values, parse_settings
+from lapwing.cli.vehicle_measurements import FIGURES, Figure, Values, parse_settings, without_unit
 from lapwing.cosim.complete_file import write_text
 from lapwing.cosim.processes.interrupt import Interrupted
 from lapwing.dynamics.config_error import ConfigError
@@ -36,10 +36,13 @@ def vehicle(
     measurements without --set are estimated from the others and marked as estimates in the file. Parts (motor,
     propeller, cell) set several figures, from published data or a size as propeller=10x4.5.
     """
-    values = parse_settings(measured or [])
+    settings = measured or []
+    values = parse_settings(settings)
     interview = Interview(name, values) if sys.stdin.isatty() else None
     try:
-        path, lift, remarks = write_vehicle(name, values, Path(), interview.ask if interview else None)
+        path, lift, remarks = write_vehicle(
+            name, values, Path(), interview.ask if interview else None, without_unit(settings)
+        )
     except (ValueError, Interrupted):
         if interview:
             interview.print_answers()
@@ -56,7 +59,11 @@ def vehicle(
 
 
 def write_vehicle(
-    name: str, measured: Values, folder: Path, ask: Callable[[Figure, float], float | None] | None = None
+    name: str,
+    measured: Values,
+    folder: Path,
+    ask: Callable[[Figure, float], float | None] | None = None,
+    unitless: Collection[str] = (),
 ) -> tuple[Path, str, list[str]]:
     """Write an airframe. Return its path, a line about its thrust over weight, and warnings.
 
@@ -65,6 +72,7 @@ def write_vehicle(
         measured: values of `lapwing.cli.vehicle_measurements.FIGURES` by name.
         folder: folder that contains `vehicles`.
         ask: (figure, estimate) -> measured value, None to accept the estimate; without `ask`, all are accepted.
+        unitless: names of the values given without a unit, which are rejected if another unit was probably meant.
 
     Raises:
         ValueError: an invalid or used name, an impossible value, or a vehicle that cannot hover.
@@ -88,10 +96,11 @@ def write_vehicle(
                 value = ask(figure, estimate(known)[figure.name])
                 known |= {} if value is None else {figure.name: value}
             elif figure.name in known:
-                figure.check(known[figure.name])
-                remarks += filter(
-                    None, [figure.plausibility_question(known[figure.name], estimate(earlier)[figure.name])]
-                )
+                value, guess = known[figure.name], estimate(earlier)[figure.name]
+                figure.check(value)
+                if figure.name in unitless:
+                    figure.check_unit(value, guess)
+                remarks += filter(None, [figure.plausibility_question(value, guess)])
             earlier |= {figure.name: known[figure.name]} if figure.name in known else {}
         values = estimate(known)
         remarks += filter(None, [_overlap(values)])

@@ -232,7 +232,7 @@ def tune(
     with step_progress(screen, "gain sets at most") as progress:
 
         def show(text: str, done: int = 0) -> None:
-            progress(text, done, gain_refinement.CANDIDATES)
+            progress(text, done, gain_refinement.GAIN_SETS)
 
         show("linearising")
         with notify_on_compile(resolve(loaded), lambda _: show("compiling, then flying")):

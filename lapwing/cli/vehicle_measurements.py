@@ -14,6 +14,7 @@ from lapwing.dynamics.units import INCH
 
 Values = Mapping[str, float]
 ROTORS = (4, 6, 8)
+LIKELY = 4.0  # ratio to the estimate within which a value in another unit was probably meant
 SIZE = re.compile(r"(\d+\.?\d*)x(\d+\.?\d*)(?:x(\d))?")  # inches, as printed on a propeller: 10x4.5, 5.1x4.3x3
 
 
@@ -55,9 +56,28 @@ class Figure(NamedTuple):
 
     def plausibility_question(self, value: float, guess: float) -> str:
         """Return a question about a value that is far from its estimate; "" for a plausible value."""
-        if not (value > 0.0 and guess > 0.0) or 1.0 / self.far <= value / guess <= self.far:
+        if self._likely(value, guess, self.far):
             return ""
-        return f"{self.name} = {value:g} {self.unit}, where about {guess:.2g} is usual: is that the unit?"
+        return (
+            f"{self.name} = {self._far_from(value, guess)}: is that {'right' if self.unit == 'count' else 'the unit'}?"
+        )
+
+    def check_unit(self, value: float, guess: float) -> None:
+        """Raise ConfigError for a number without a unit that is far from its estimate, but near it in another unit."""
+        others = {name: size * value for name, size in units.UNITS.get(self.unit, {}).items() if name != '"'}
+        near = [name for name, other in others.items() if self._likely(other, guess, LIKELY)]
+        if near and not self._likely(value, guess, self.far):
+            meant = min(near, key=lambda name: abs(math.log(others[name] / guess)))
+            expected = f"{value:g}{meant}, or {value:g}{self.unit.replace(' ', '')} if that is right"
+            raise ConfigError(f"--set {self.name}={value:g}", self._far_from(value, guess), expected)
+
+    def _far_from(self, value: float, guess: float) -> str:
+        unit = "" if self.unit in ("count", "-") else f" {self.unit}"
+        return f"{value:g}{unit}, where about {float(f'{guess:.2g}'):g} is usual"
+
+    @staticmethod
+    def _likely(value: float, guess: float, factor: float) -> bool:
+        return not (value > 0.0 and guess > 0.0) or 1.0 / factor <= value / guess <= factor
 
 
 FIGURES = (
@@ -155,6 +175,12 @@ def parse_settings(settings: list[str]) -> dict[str, float]:
         except ConfigError as error:
             raise ConfigError(f"--set {setting}", error.message, error.expected) from None
     return of_parts | single
+
+
+def without_unit(settings: list[str]) -> set[str]:
+    """Return the names of the figures whose texts are numbers alone."""
+    texts = {name.strip(): text for name, _, text in (setting.partition("=") for setting in settings)}
+    return {name for name, text in texts.items() if name in BY_NAME and units.parse(text, BY_NAME[name].unit) is None}
 
 
 @cache

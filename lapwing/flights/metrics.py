@@ -52,13 +52,14 @@ def check_success(scene: Scene) -> None:
         scene[Success].check_names(METRICS)
 
 
-def unmet_criteria(flight: FlightData) -> list[str]:
-    """Return the expressions of `success.require` that do not hold, except the default one."""
+def own_criteria(flight: FlightData) -> dict[str, bool]:
+    """Return whether each expression of `success.require` holds, except the default one."""
     with suppress(ValueError):  # the log has no run configuration, or one of another version
         criteria = Success.model_validate(flight.origin.scene.get(Success.TABLE, {}))
         own = [text for text in criteria.require if text not in Success().require]
-        return Success(require=tuple(own)).unmet(metrics(flight)) if own else []
-    return []
+        unmet = Success(require=tuple(own)).unmet(metrics(flight)) if own else []
+        return {text: text not in unmet for text in own}
+    return {}
 
 
 def metrics(flight: FlightData) -> dict[str, Any]:

@@ -75,7 +75,7 @@ class FlightOutcome(NamedTuple):
         """Return the outcome as one to three sentences without the last full stop."""
         if self.kind == "completed":
             return f"Completed at {self.time:.2f} s: {self.how}"
-        x, y, z = self.position
+        x, y, z = (round(value, 2) + 0.0 for value in self.position)  # no -0.00
         tilted = f"tilted by {math.degrees(self.tilt):.0f}° " if self.kind == "crashed" and self.tilt > LYING else ""
         where = "" if self.kind in ("diverged", "aborted") else f"; ends {tilted}at ({x:.2f}, {y:.2f}, {z:.2f}) m"
         later = [f"{text} {time - self.time:.2f} s later" for time, text in self.consequences[:MOST_CONSEQUENCES]]

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from lapwing.cosim.config import user_module
 from lapwing.cosim.config.provenance import CONFIG_FILE
-from lapwing.cosim.config.run_config import RunConfig
+from lapwing.cosim.config.run_config import PerVehicle, RunConfig, ServiceConfig
 from lapwing.cosim.config.serialise import from_json
 from lapwing.cosim.diagram.multi_vehicle import members
 from lapwing.cosim.log import LogReader
@@ -152,9 +152,16 @@ def _at(commands: Mapping[int, tuple[Any, ...]]) -> Operator:
 
 
 def without_plan(config: RunConfig) -> RunConfig:
-    """Return the run configuration without the plan's commands, which the log has among the accepted commands."""
-    if "autopilot" not in config.services or not config.vehicle:  # a fleet has no plan
+    """Return the run configuration without the plans' commands, which the log has among the accepted commands."""
+    if "autopilot" not in config.services:
         return config
-    autopilot = config.services["autopilot"]
-    without_commands = autopilot._replace(parameters=autopilot.parameters._replace(plan=()))
-    return config._replace(services={**config.services, "autopilot": without_commands})
+    own = config.services["autopilot"]
+    if isinstance(fleet := own.parameters, PerVehicle):
+        without = own._replace(parameters=fleet._replace(given=tuple(map(_without_plan, fleet.given))))
+    else:
+        without = _without_plan(own)
+    return config._replace(services={**config.services, "autopilot": without})
+
+
+def _without_plan(autopilot: ServiceConfig) -> ServiceConfig:
+    return autopilot._replace(parameters=autopilot.parameters._replace(plan=()))

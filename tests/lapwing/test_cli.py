@@ -177,6 +177,13 @@ def test_help_lists_commands_in_groups_on_single_lines():
     assert without.stdout == result.stdout
 
 
+def test_help_of_new_is_not_cut_off(lapwing):
+    code, out, _ = lapwing("new", "--help")
+    rows = out.partition("Commands:\n")[2].splitlines()
+    assert (code, len(rows)) == (0, 7)
+    assert [row for row in rows if row.endswith("...")] == []
+
+
 def test_scenes_and_broken_scenes_are_listed_on_one_line_each(lapwing, tmp_path):
     (tmp_path / "broken.toml").write_text("[run\n")
     code, out, _ = lapwing("scenes")

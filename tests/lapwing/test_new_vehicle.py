@@ -116,6 +116,26 @@ def test_figure_far_from_its_guess_is_warned_of(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ("diameter=15", "diameter=15: 15 m, where about 0.26 is usual; expected 15in, or 15m if that is right"),
+        ("mass=5 arm=40", "arm=40: 40 m, where about 0.36 is usual; expected 40cm, or 40m if that is right"),
+        ("mass=750", "mass=750: 750 kg, where about 2 is usual; expected 750g, or 750kg if that is right"),
+        ("stand_speed=6000", "stand_speed=6000: 6000 rad/s, where about 610 is usual; expected 6000rpm, or 6000rad/s"),
+    ],
+)
+def test_number_whose_unit_was_probably_forgotten_is_rejected(tmp_path, monkeypatch, options, message):
+    monkeypatch.chdir(tmp_path)
+    given = [option for each in options.split() for option in ("--set", each)]
+    done = CliRunner().invoke(app, ["new", "vehicle", "mine", *given])
+    assert done.exit_code == 2
+    assert f"--set {message}" in done.output
+    assert not list(tmp_path.iterdir())
+    done = CliRunner().invoke(app, ["new", "vehicle", "mine", "--set", "diameter=15m"])
+    assert (done.exit_code, "diameter = 15 m, where about 0.26 is usual: is that the unit?" in done.output) == (0, True)
+
+
+@pytest.mark.parametrize(
     ("figures", "message"),
     [
         ({"mass": -1.0}, "mass: expected a number above 0 and below 10000, in kg, got -1"),

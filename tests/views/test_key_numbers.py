@@ -74,6 +74,19 @@ def test_report_names_missed_criteria_of_scene(tmp_path):
     text = write(values, tmp_path / "a.html").read_text(encoding="utf-8")
     assert text.count("Not met: ") == 1
     assert "Not met: max_distance &lt; 0.4<" in text
+    assert '<p class="missing">Met: rmse.x &lt; 1</p>' in text
+    assert '<p class="outcome bad"><strong>Failed.</strong> ' in text  # though the flight itself went well
+
+
+def test_end_of_failsafe_is_no_trouble():
+    values = flight()
+    values.events = [Event(1.0, "failsafe", "no GPS"), Event(2.0, "failsafe", "no GPS: over")]
+    assert [event.time for event in trouble(values)] == [1.0]
+
+
+def test_position_at_the_end_has_no_negative_zero():
+    outcome = flight().outcome._replace(kind="landed", position=(-0.001, 0.001, 0.1))
+    assert "ends at (0.00, 0.00, 0.10) m" in str(outcome)
 
 
 def test_number_without_limit_is_neither_good_nor_bad(tmp_path):

@@ -1,10 +1,10 @@
 """Refinement of bandwidths in simulated flights: smallest tracking error with the required margins."""
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
-from scipy.optimize import minimize
 
 from lapwing.cosim.scene import Scene
 from lapwing.flights.tracking import AXES
@@ -20,12 +20,15 @@ from lapwing.studies.tune.linearise import Hover
 
 Figures = dict[str, Any]  # metrics by name, see `lapwing.flights.metrics`
 
-CANDIDATES = 60  # largest number of gain sets
-FIRST_STEP = 0.1  # initial step of the logarithm of every bandwidth
-SEARCH_TOLERANCE = 2e-3  # step and relative error at the end of the search
-SEEDS = 3  # flights of each candidate, to average over the noise
-# Axes whose errors judge a bandwidth.
-JUDGING_AXES = {"altitude": ("z",), "yaw": ("yaw",), "attitude": ("x", "y"), "position": ("x", "y")}
+GAIN_SETS = 24  # largest number that is flown
+FIRST_STEP, LAST_STEP = 0.1, 0.005  # of the logarithm of a bandwidth
+SEEDS = 3  # flights of each gain set, to average over the noise
+# Bandwidths of each search, the axes of which one must be excited, and others that judge them too.
+SEARCHES = (
+    (("altitude",), ("z",), ()),
+    (("yaw",), ("yaw",), ()),
+    (("attitude", "position"), ("x", "y"), ("roll", "pitch")),
+)
 MIN_RMSE = 1e-6  # [m], [rad] axes with smaller errors are not excited and not judged
 
 
@@ -36,7 +39,43 @@ class Refinement(NamedTuple):
     bandwidths: Bandwidths
     before: list[Figures]  # metrics of the flights with the initial gains, one per seed
     after: list[Figures]  # metrics with the refined gains
-    candidates: int  # number of gain sets with the margins, which were flown
+    gain_sets: int  # number of gain sets flown
+
+
+class _Search:
+    """Pattern search over the logarithms of the bandwidths of some loops: a step of one of them at a time."""
+
+    def __init__(self, loops: tuple[str, ...], axes: tuple[str, ...], cost: float):
+        self.axes = axes
+        self._moves = [(loop, sign) for loop in loops for sign in (1.0, -1.0)]
+        self._step, self._failed, self._cost = FIRST_STEP, 0, cost
+
+    def step(self, at: Bandwidths, is_valid: Callable[[Bandwidths], bool]) -> dict[str, float]:
+        """Return the next valid step from `at`: the changed bandwidth by name; empty at the end of the search."""
+        while self._step >= LAST_STEP:
+            for _ in range(len(self._moves) - self._failed):
+                loop, sign = self._moves[0]
+                change = {loop: getattr(at, loop) * math.exp(sign * self._step)}
+                if is_valid(at._replace(**change)):
+                    return change
+                self._reject()
+            self._step, self._failed = 0.5 * self._step, 0
+        return {}
+
+    def accepts(self, cost: float) -> bool:
+        """Return True if the step reduces the cost. The way back needs no trial then."""
+        if not cost < self._cost:
+            self._reject()
+            return False
+        loop, sign = self._moves[0]
+        self._moves.remove((loop, -sign))
+        self._moves.append((loop, -sign))
+        self._cost, self._failed = cost, 1
+        return True
+
+    def _reject(self) -> None:
+        self._moves.append(self._moves.pop(0))
+        self._failed += 1
 
 
 def refine(
@@ -47,51 +86,58 @@ def refine(
     start: Bandwidths,
     progress: Callable[[], None] = lambda: None,
 ) -> Refinement:
-    """Refine the bandwidths that the scene's path excites by Nelder and Mead's search, from `start`.
+    """Refine the bandwidths that the scene's path excites by pattern searches from `start`.
 
-    The objective is the mean over the axes of the RMSE over that of `start`. A gain set that does not land or lacks a
-    margin is worse than any that flies. Deterministic: equal scenes return equal gains.
+    A loop has its own axes and margins, so each flight tests a step of altitude, one of yaw, and one of the cascade at
+    once, and each is judged by its own axes: the mean of their RMSE over that of `start`. The best of all gain sets
+    flown is the result, by the mean over all axes; a gain set that does not land is none, one that lacks a margin is
+    not flown. Deterministic: equal scenes return equal gains.
+
+    Raises:
+        ValueError: no gain set lands.
     """
     plant, config = assumed_airframe(airframe, model), campaign_config(scene)
-    valid: dict[float, tuple[Bandwidths, GainSet, list[Figures]]] = {}
+    flown: dict[Bandwidths, list[Figures]] = {}
 
-    def fly(gains: GainSet) -> list[Figures]:
-        progress()
-        run = with_gains(config, gains)
-        return [metrics_of(reseed(run, config.seed + k)) for k in range(SEEDS)]
+    def fly(bandwidths: Bandwidths) -> list[Figures]:
+        if bandwidths not in flown:
+            progress()
+            run = with_gains(config, gain_set(model, bandwidths))
+            flown[bandwidths] = [metrics_of(reseed(run, config.seed + k)) for k in range(SEEDS)]
+        return flown[bandwidths]
 
-    before = fly(gain_set(model, start))
-    judged_axes = [axis for axis in AXES if rmse(before, axis) > MIN_RMSE]
+    def has_margins(bandwidths: Bandwidths) -> bool:
+        return not shortfalls(open_loops(build(gain_set(model, bandwidths).plain(), airframe), plant, tick, DELAY))
 
-    free_bandwidths = [name for name, axes in JUDGING_AXES.items() if set(axes) & set(judged_axes)]
+    def cost(flights: list[Figures], axes: Sequence[str]) -> float:
+        if any(f["outcome"] != "landed" for f in flights):
+            return math.inf
+        return float(np.mean([rmse(flights, axis) / rmse(before, axis) for axis in axes]))
 
-    def cost(logarithms: np.ndarray) -> float:
-        bandwidths = start._replace(**{n: float(b) for n, b in zip(free_bandwidths, np.exp(logarithms), strict=True)})
-        gains = gain_set(model, bandwidths)
-        missing = shortfalls(open_loops(build(gains.plain(), airframe), plant, tick, DELAY))
-        if missing:
-            return 10.0 + len(missing)
-        result = fly(gains)
-        if any(f["outcome"] != "landed" for f in result):
-            return 10.0
-        ratio = float(np.mean([rmse(result, axis) / rmse(before, axis) for axis in judged_axes]))
-        valid[ratio] = bandwidths, gains, result
-        return ratio
-
-    if not free_bandwidths:
+    before = fly(start)
+    judged = [axis for axis in AXES if rmse(before, axis) > MIN_RMSE]
+    searches = []
+    for loops, excited, others in SEARCHES:
+        if set(excited) & set(judged):
+            axes = tuple(axis for axis in (*excited, *others) if axis in judged)
+            searches.append(_Search(loops, axes, cost(before, axes)))
+    if not searches:
         return Refinement(gain_set(model, start), start, before, before, 0)
-    at = np.log([getattr(start, name) for name in free_bandwidths])
-    simplex = np.vstack([at, at + FIRST_STEP * np.eye(len(at))])
-    options = {"maxfev": CANDIDATES, "xatol": SEARCH_TOLERANCE, "fatol": SEARCH_TOLERANCE, "initial_simplex": simplex}
-    minimize(cost, at, method="Nelder-Mead", options=options)
-    if not valid:
-        reason = next(
-            (f["outcome_text"] for f in before if f["outcome"] != "landed"),
-            "no gain set nearby has the margins and lands",
-        )
+    at = start
+    while len(flown) < GAIN_SETS - 1:
+        steps = [(search, step) for search in searches if (step := search.step(at, has_margins))]
+        if not steps:
+            break
+        flights = fly(at._replace(**{name: value for _, step in steps for name, value in step.items()}))
+        for search, step in steps:
+            if search.accepts(cost(flights, search.axes)):
+                at = at._replace(**step)
+    fly(at)
+    best = min(flown, key=lambda bandwidths: cost(flown[bandwidths], judged))
+    if math.isinf(cost(flown[best], judged)):
+        reason = next(f["outcome_text"] for f in before if f["outcome"] != "landed")
         raise ValueError(f"no gain set completes this flight; designed gains: {reason}; use other bandwidths")
-    bandwidths, gains, after = valid[min(valid)]
-    return Refinement(gains, bandwidths, before, after, len(valid))
+    return Refinement(gain_set(model, best), best, before, flown[best], len(flown))
 
 
 def rmse(flights: list[Figures], axis: str) -> float:

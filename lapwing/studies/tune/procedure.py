@@ -1,6 +1,7 @@
 """Procedure of `lapwing tune`: linear model, present gains, design for margins, refinement in simulated flights."""
 
-from collections.abc import Callable
+import re
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
 
@@ -56,10 +57,19 @@ class Tuning(NamedTuple):
 
     @property
     def failures(self) -> list[str]:
-        """Loops of the new gains without the required margins, and failed flights of perturbed vehicles."""
-        loops = [f"{LOOP_WORDS[name]}: {why}" for name, why in self.after.shortfalls.items()]
-        return loops + [f"{corner}: {corners.failure(flight)}" for corner, flight in self.corners.items()
-                        if corners.failure(flight)]  # fmt: skip
+        """Loops of the new gains without the required margins, and failed flights of perturbed vehicles.
+
+        Each reason is listed once: the loops that share it, and the first flight of each outcome.
+        """
+        flights: dict[str, list[str]] = {}
+        for corner, flight in self.corners.items():
+            if text := corners.failure(flight):
+                flights.setdefault(flight["outcome"], []).append(f"{corner}: {text}")
+        firsts = [
+            first + (f" ({len(others)} other vehicles: {outcome})" if others else "")
+            for outcome, (first, *others) in flights.items()
+        ]
+        return [*_by_reason(self.after.shortfalls), *firsts]
 
 
 def tune(
@@ -96,8 +106,8 @@ def tune(
     model = identification.model if identification else compiled_model
     plant = assumed_airframe(airframe, model)
     before = _review(settings.gains, present, plant, tick)
-    for name, why in before.shortfalls.items():
-        warn(f"warning: present gains {settings.gains} of the scene: {LOOP_WORDS[name]}: {why}")
+    if faults := _by_reason(before.shortfalls):
+        warn(f"warning: present gains {settings.gains} of the scene: {'; '.join(faults)}")
     bandwidths = design(model, airframe, tick, initial, warn)
     gains, refinement, corner_flights = gain_set(model, bandwidths), None, {}
     if follows_trajectory(scene) and scene[Vehicle].model == "rigid_body" and not settings.accept_commands:
@@ -118,6 +128,15 @@ def _review(name: str, parameters: Parameters, plant: Airframe, tick: float) -> 
     return GainReview(
         name, parameters, {loop: margins(response) for loop, response in loops.items()}, shortfalls(loops)
     )
+
+
+def _by_reason(shortfalls: Mapping[str, str]) -> list[str]:
+    """Return a text for each reason, such as "phase margin below 45 deg: roll, pitch loop", from `shortfalls`."""
+    loops: dict[str, list[str]] = {}
+    for name, why in shortfalls.items():
+        reason = re.sub(r" [-+./\d]+ (deg|dB), below (\d+)", r" below \2 \1", why)
+        loops.setdefault(reason, []).append(LOOP_WORDS[name].removesuffix(" loop"))
+    return [f"{reason}: {', '.join(names)} loop" for reason, names in loops.items()]
 
 
 def write(path: Path, gains: GainSet) -> None:

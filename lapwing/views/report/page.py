@@ -9,7 +9,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
 from lapwing.flights.flight_data import FlightData
 from lapwing.flights.flight_topics import AXES
-from lapwing.flights.metrics import unmet_criteria
+from lapwing.flights.metrics import own_criteria
 from lapwing.flights.tracking import unit_and_factor
 from lapwing.views.report.flight_header import differences, facts
 from lapwing.views.report.key_numbers import key_numbers, trouble
@@ -17,6 +17,7 @@ from lapwing.views.report.plotly_script import gzip_base64, remove_unused_traces
 from lapwing.views.report.sections import Section, labels, long, sections
 from lapwing.views.report.style import DARK
 
+VERDICTS = {"good": "Good", "warn": "Flawed", "bad": "Failed"}  # by the mark of an outcome
 OPEN = ("timeline", "position")  # sections that are initially open
 _HERE = Path(__file__).parent
 _LOADER = FileSystemLoader(_HERE)
@@ -37,7 +38,7 @@ def flight_page(flights: Sequence[FlightData], view3d: bool = False) -> str:
     """Return the page of one flight, or of an overlay of two, with the 3D view if `view3d`."""
     scenes = [flight.origin.scene for flight in flights]
     published = scenes[0].get("published", {})
-    names = labels(flights)
+    names, own = labels(flights), [own_criteria(flight) for flight in flights]
     tables = [facts(flight) for flight in flights]
     others = flights[0].others if len(flights) == 1 else ()
     section_iterator = sections(flights)  # each is drawn when the template reaches it
@@ -50,12 +51,13 @@ def flight_page(flights: Sequence[FlightData], view3d: bool = False) -> str:
         labels=names if len(flights) > 1 else (),
         outcomes=[
             (
-                flight.outcome.mark,
+                flight.outcome.mark if all(criteria.values()) else "bad",
                 f"{flight.vehicle}: {flight.outcome}" if others else flight.outcome,
             )
-            for flight in flights
+            for flight, criteria in zip(flights, own, strict=True)
         ],
-        unmet=[unmet_criteria(flight) for flight in flights],
+        verdicts=VERDICTS,
+        criteria=own,
         events=[flight.events for flight in flights],
         vehicle=flights[0].vehicle,
         numbers=[key_numbers(flight) for flight in flights],

@@ -64,7 +64,6 @@ def result(tuning: Tuning) -> StudyResult:
         f"{tuning.scene}: gains", _outcome(tuning), "bad" if tuning.failures else "good", (tuning.gains.description,),
         (_margins(tuning), *flown, _model(tuning), gains),
         {"Open loops": partial(_bode, reviews, loops), "Step responses": partial(_steps, reviews, loops)},
-        tuple(f"new gains fail: {text}" for text in tuning.failures),
     )  # fmt: skip
 
 
@@ -88,18 +87,19 @@ def _cells(m: Margins) -> tuple[str, ...]:
 
 def _margins(tuning: Tuning) -> Rows:
     heads = ("loop", "gains", "crossover,\nrad/s", "phase\nmargin, °", "gain\nmargin, dB", "reduction,\ndB")
-    rows = Rows("Margins of the loops before and after", *heads, caption=_MARGINS)
+    rows = Rows(f"Margins of the loops before ({tuning.before.name}) and after", *heads, caption=_MARGINS)
     for name in tuning.after.margins:
         for review in (tuning.before, tuning.after):
             failed = review is tuning.after and name in review.shortfalls
-            rows.add(LOOP_WORDS[name], review.name, *_cells(review.margins[name]), failed=failed)
+            label = "new" if review is tuning.after else "before"
+            rows.add(LOOP_WORDS[name], label, *_cells(review.margins[name]), failed=failed)
     return rows
 
 
 def _errors(tuning: Tuning) -> Rows:
     p = tuning.refinement
     assert p is not None
-    title = f"RMSE of {len(p.after)} flights of the scene, designed and refined ({p.candidates} gain sets flown)"
+    title = f"RMSE of {len(p.after)} flights of the scene, designed and refined ({p.gain_sets} gain sets flown)"
     rows = Rows(title, "axis", "designed", "refined", caption=_ERRORS)
     for axis in AXES:
         unit, scale = unit_and_factor(axis)

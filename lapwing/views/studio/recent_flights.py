@@ -12,7 +12,7 @@ import numpy as np
 from lapwing.api.flight import Flight
 from lapwing.cosim.output_lock import is_locked, modification_time
 from lapwing.flights.flight_data import SHOWN
-from lapwing.flights.metrics import unmet_criteria
+from lapwing.flights.metrics import own_criteria
 from lapwing.flights.outcome import MARKS
 from lapwing.views.report import write
 from lapwing.views.report.key_numbers import TROUBLE, KeyNumber, key_numbers
@@ -195,7 +195,7 @@ def _summary(path: Path) -> FlightSummary:
         reason = str(error).removeprefix(f"{path}: ")
         return FlightSummary(path.name, path.stem, "", recorded, "bad", "", "", (), (), 0, 0.0, None, {}, reason)
     worst = max(flights, key=lambda flight: MARKS.index(flight.outcome.mark))
-    unmet = [text for flight in flights for text in unmet_criteria(flight)]
+    unmet = [text for flight in flights for text, met in own_criteria(flight).items() if not met]
     outcome = "; not met: ".join([str(worst.outcome), *dict.fromkeys(unmet)])
     run = worst.origin.scene.get("run", {})
     return FlightSummary(

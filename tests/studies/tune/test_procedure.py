@@ -8,12 +8,13 @@ from rich.console import Console
 from typer.testing import CliRunner
 
 from lapwing.cli.main import app
+from lapwing.flights.tracking import AXES
 from lapwing.services.autopilot.gains import load
 from lapwing.services.autopilot.stability_check import unstable_loops
 from lapwing.services.scene_resolver import load as load_scene
 from lapwing.studies.simulate import fly
 from lapwing.studies.tune.bandwidths import Bandwidths
-from lapwing.studies.tune.gain_refinement import rmse
+from lapwing.studies.tune.gain_refinement import MIN_RMSE, rmse
 from lapwing.studies.tune.procedure import tune, write
 from lapwing.views.studies.study_result import show, write_report
 from lapwing.views.studies.tune_result import result as tune_result
@@ -74,7 +75,7 @@ def test_page_and_tables(tuning, tmp_path):
     assert "_plant_input" not in page
     loop = "pitch with forward loop"
     rows = [[loop, *line.partition(loop)[2].split()] for line in text.splitlines() if loop in line]
-    assert [row[1] for row in rows] == [tuning.before.name, "new"]
+    assert [row[1] for row in rows] == ["before", "new"]
     for row, review in zip(rows, (tuning.before, tuning.after), strict=True):
         m = review.margins["x_plant_input"]
         expected = (m.crossover, np.degrees(m.phase), 20.0 * np.log10(m.gain), 20.0 * np.log10(m.reduction))
@@ -92,16 +93,31 @@ def test_failing_gains_are_reported_and_require_force(tuning, tmp_path, monkeypa
     assert (result.exit_code, out.exists()) == (1, False)
     assert "Crashed at 3.00 s" in result.output
     assert "--force" in result.output
+    assert result.output.count("Crashed at 3.00 s") == 2  # in the verdict and in the error
     result = CliRunner().invoke(app, ["tune", str(HOVER), "--out", str(out), "--force"])
     assert (result.exit_code, out.exists()) == (0, True)
+
+
+def test_each_reason_of_a_failure_is_named_once(tuning):
+    flights = [corner | {"outcome": "crashed", "outcome_text": "Crashed"} for corner in tuning.corners.values()]
+    failing = tuning._replace(corners=dict(zip(tuning.corners, flights, strict=True)))
+    assert failing.failures == [f"{next(iter(tuning.corners))}: Crashed (7 other vehicles: crashed)"]
+
+
+def test_gain_sets_are_few_and_best_by_the_mean_of_all_axes(tuning):
+    refinement = tuning.refinement
+    assert refinement.gain_sets <= 24  # of three flights each: they are most of the cost
+    axes = [axis for axis in AXES if rmse(refinement.before, axis) > MIN_RMSE]
+    assert np.mean([rmse(refinement.after, axis) / rmse(refinement.before, axis) for axis in axes]) < 1.0
 
 
 def test_weak_present_gains_raise_warning():
     output = []
     tune(load_scene(HOVER, ["autopilot.gains=paper"]), Bandwidths(), output.append)
-    assert any(
-        line.startswith("warning: present gains paper of the scene: roll loop: phase margin 2") for line in output
-    )
+    warnings = [line for line in output if line.startswith("warning: ")]
+    assert len(warnings) == 1
+    assert warnings[0].startswith("warning: present gains paper of the scene: ")
+    assert "phase margin below 45 deg: roll, roll with sideways, pitch, pitch with forward loop" in warnings[0]
 
 
 def gains_with(tmp_path, **changes):

@@ -94,7 +94,7 @@ def test_user_selects_changes_runs_views_and_compares(start, tmp_path):
         user.do("await until(() => one('.outcome'));")
         user.go("one('.brand').click()", studio.address)
         command = fly(user, {"run.seed": "7", "trajectory.phase.0.z.to": "1.5"})
-        assert command == "lapwing run hover --set run.seed=7 --set trajectory.phase.0.z.to=1.5 --speed max"
+        assert command == "lapwing run hover --set trajectory.phase.0.z.to=1.5 --set run.seed=7 --speed max"
         outcome = user.do("return (await until(() => one('.outcome.good'))).textContent;")
         assert outcome.startswith("Landed at ")
         frame = user.do("return (await until(() => one('iframe.report'))).src;")
