@@ -77,3 +77,11 @@ def test_vehicle_returns_from_the_fence_and_its_log_repeats(tmp_path):
 def test_flight_within_the_fence_is_as_without_one():
     free, fenced = fly(load("quad_x")), fly(load("quad_x", [SQUARE]))
     assert np.array_equal(free.truth.position, fenced.truth.position)
+
+
+@pytest.mark.long
+def test_log_of_a_fleet_with_a_fence_repeats(tmp_path):
+    words = ("run", "fleet", "--mode", "single-process", "--log", "fleet.mcap", "--set", "run.duration=8.0")
+    done = run_command(*words, "--set", "fence.keep_out=[{position = [50, 50], radius = 2.0}]", folder=tmp_path)
+    assert (tmp_path / "fleet.mcap").exists(), done.stderr
+    assert "identical" in run_command("resimulate", "fleet.mcap", code=0, folder=tmp_path).stdout
