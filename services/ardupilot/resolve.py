@@ -25,6 +25,7 @@ SIMULATED = {  # parameters [ms] of the delay of ArduPilot's model of each senso
 }
 DELAY_MIN = 1.0  # [ms] GPS1_DELAY_MS, where 0 stands for the delay that ArduPilot expects of a kind of receiver
 VOLTAGE_AND_CURRENT = 4.0  # BATT_MONITOR
+FOUR_MOTORS = 15.0  # SIM_VIB_MOT_MASK
 LOOP_RATE = 400  # [Hz] of ArduCopter's main loop, which the rate of the exchange must exceed
 
 
@@ -78,9 +79,10 @@ def resolve(scene: Scene) -> ServiceConfig | None:
 def sensor_parameters(scene: Scene) -> dict[str, float]:
     """Return the ArduPilot parameters that describe the scene: delays and rate of its sensors.
 
-    BATT_MONITOR = 4: ArduPilot measures the plant's battery, and its log has the voltage.
+    BATT_MONITOR = 4: ArduPilot measures the plant's battery, and its log has the voltage. SIM_VIB_MOT_MASK names the
+    motors whose throttle lowers this voltage, which `SimulatedSensors` compensates; by default 4.7 knows none.
     """
-    result = {"BATT_MONITOR": VOLTAGE_AND_CURRENT, **latencies(scene, SIMULATED)}
+    result = {"BATT_MONITOR": VOLTAGE_AND_CURRENT, "SIM_VIB_MOT_MASK": FOUR_MOTORS, **latencies(scene, SIMULATED)}
     if ports.GPS in scene.tables("sensors"):
         rate = scene.lookup(f"sensors.{ports.GPS}.rate")
         result |= {"SIM_GPS1_HZ": rate, "SIM_GPS_HZ": rate}

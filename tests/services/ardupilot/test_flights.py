@@ -121,3 +121,8 @@ def test_arducopter_flies_its_square(tmp_path):
     assert "Landed" in fly("ardupilot", [binary], "--log", log).stdout
     with LogReader(log) as reader:
         assert "skew 0 ms" in reader.metadata["firmware"]
+        assert reader.metadata["repeatable"] == "yes"
+    lapwing("resimulate", log)  # the firmware flies again
+    lapwing("validate", "ardupilot_quad", tmp_path / "flight.ardupilot.bin", "--json", tmp_path / "errors.json")
+    (flight,) = json.loads((tmp_path / "errors.json").read_text())["flights"].values()
+    assert flight["thrust_ratio"] == pytest.approx(1.0, abs=0.02)
