@@ -3,10 +3,14 @@
 Operations without a finite real result return infinity or NaN, as those of doubles do. There is no negative zero.
 """
 
+import operator
 from collections.abc import Callable
 from typing import Any
 
 import mpmath
+from numba.extending import typeof_impl
+
+from lapwing.kernels import simd
 
 CONTEXT = mpmath.MPContext()  # of its own, because other users of mpmath set the digits of the common one
 CONTEXT.dps = 32
@@ -69,4 +73,43 @@ FUNCTIONS: dict[str, Callable[..., Any]] = {
     "square": lambda x: CONTEXT.mpf(x) * x,
     "tan": CONTEXT.tan,
     "tanh": CONTEXT.tanh,
+}
+
+
+class Lanes:
+    """Four numbers in place of a vector of `lapwing.kernels.simd`."""
+
+    def __init__(self, *numbers: Any):
+        """Store one number for each lane."""
+        self.numbers = numbers
+
+    def __neg__(self) -> "Lanes":
+        return Lanes(*(-number for number in self.numbers))
+
+
+typeof_impl.register(Lanes)(lambda value, context: simd.LANES)
+
+
+def _in_lanes(function: Callable[..., Any]) -> Callable[..., Lanes]:
+    def evaluate(*x: Any) -> Lanes:
+        return Lanes(*(function(*(a.numbers[k] if isinstance(a, Lanes) else a for a in x)) for k in range(4)))
+
+    return evaluate
+
+
+def _reflected(function: Callable[..., Any]) -> Callable[..., Any]:
+    return lambda x, y: function(y, x)
+
+
+for _operation in (operator.add, operator.sub, operator.mul, operator.truediv):
+    setattr(Lanes, f"__{_operation.__name__}__", _in_lanes(_operation))
+    setattr(Lanes, f"__r{_operation.__name__}__", _reflected(_in_lanes(_operation)))
+
+VECTOR_FUNCTIONS: dict[Any, Callable[..., Any]] = {
+    simd.any_above: lambda x: any(number > 0.0 for number in x.numbers),
+    simd.pack4: Lanes,
+    simd.select: _in_lanes(lambda flag, a, b: a if flag > 0.0 else b),
+    simd.splat: lambda x: Lanes(x, x, x, x),
+    simd.sqrt: _in_lanes(FUNCTIONS["sqrt"]),
+    simd.unpack4: lambda x: x.numbers,
 }

@@ -13,10 +13,10 @@ import numpy as np
 
 from lapwing.dynamics import noise
 from lapwing.dynamics.integrators import RATES
-from lapwing.kernels import math
+from lapwing.kernels import math, simd
 from lapwing.kernels.codegen import GENERATORS
 from lapwing.studies.accuracy.coordinates import coordinates, error
-from lapwing.studies.accuracy.extended_numbers import FUNCTIONS, Number
+from lapwing.studies.accuracy.extended_numbers import FUNCTIONS, VECTOR_FUNCTIONS, Number
 from lapwing.studies.accuracy.problem import Problem
 
 STEPS = 400  # at least
@@ -96,6 +96,8 @@ def _extend(function: Any, known: dict[FunctionType, Any]) -> Any:
         return _MATH
     if isinstance(function, ModuleType) and function.__name__.startswith("lapwing"):
         return _Module(function, known)
+    if isinstance(function, type(simd.pack4)):
+        return VECTOR_FUNCTIONS.get(function, function)
     generate = _generator(function)
     python = getattr(function, "py_func", function)
     is_own = python is not function or (getattr(python, "__module__", None) or "lapwing").startswith("lapwing")

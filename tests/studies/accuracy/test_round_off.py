@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from lapwing.dynamics import integrators
+from lapwing.dynamics.effects.ground_contact import _feet_wrench
 from lapwing.dynamics.integrators import RATES, rk4
+from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vehicles import multirotor
-from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY
+from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, motion_of
 from lapwing.kernels import always_inline, math
 from lapwing.studies.accuracy import plant, round_off
 from lapwing.studies.accuracy.extended_numbers import Number
@@ -135,6 +137,23 @@ def test_multirotor_of_scene_has_digits_of_extended_precision() -> None:
     for value, digits in zip(values, climb_in_digits(p, volts, 20.0, speed, h, steps), strict=True):
         with mpmath.workdps(50):
             assert abs(mpmath.mpf(value) - digits) < 1e-29 * (1 + abs(digits))  # a double has 1.1e-16
+
+
+def test_feet_in_lanes_have_extended_precision() -> None:
+    """Four feet 1 mm in the ground, on two of which the tilted vehicle presses harder, and one in the air."""
+    scene = scene_of("lapwing/scenes/hover.toml", [])
+    _, p = plant.model(scene).describe(scene)
+    contact = next(e for e in p.effects if type(e).__name__ == "GroundContact")
+    sole = min(z for _, _, z in contact.feet)
+    state = multirotor.initial_state(p, (0.0, 0.0, -sole - 0.001), (0.999, 0.02, -0.03, 0.0), rotor_speed=0.0)
+    motion = motion_of(p.layout, state.motion)._replace(velocity_world=(0.1, -0.2, -0.05))
+    arguments = contact, state.memory[p.effects.index(contact)], motion, rotation_matrix(motion.attitude)
+    double = _feet_wrench(*arguments)
+    result = extend(_feet_wrench)(*map(in_extended_precision, arguments))
+    assert double[0][2] > 1.0
+    for vector, digits in zip(double, result, strict=True):
+        assert all(isinstance(number, Number) for number in digits)
+        assert [float(number) for number in digits] == pytest.approx(vector, rel=1e-13)
 
 
 @pytest.mark.long
