@@ -150,12 +150,12 @@ class _Diagram:
     def latest(self, port, tick):
         return self._samples[port]
 
-    def part(self, name):
+    def block(self, name):
         return name
 
-    def prepare(self, part):
-        self.code = bind(part, self.ports, self._rows)
+    def prepare(self, block):
+        self.code = bind(block, self.ports, self._rows)
         return self.code
 
-    def replace(self, part, code):
+    def replace(self, block, code):
         pass
