@@ -81,6 +81,7 @@ def sensor_parameters(scene: Scene) -> dict[str, float]:
 
     BATT_MONITOR = 4: ArduPilot measures the plant's battery, and its log has the voltage. SIM_VIB_MOT_MASK names the
     motors whose throttle lowers this voltage, which `SimulatedSensors` compensates; by default 4.7 knows none.
+    ArduPilot's parameters of IMU noise, 0 by default, then act in flight; there is no vibration without them.
     """
     result = {"BATT_MONITOR": VOLTAGE_AND_CURRENT, "SIM_VIB_MOT_MASK": FOUR_MOTORS, **latencies(scene, SIMULATED)}
     if ports.GPS in scene.tables("sensors"):

@@ -35,12 +35,16 @@ _LAYOUTS = {  # mode, action, delay [s], cause
     event_id("commander_failsafe_enter_generic"): ("<4xB", ("action",)),
     event_id("commander_failsafe_enter"): ("<4xBB", ("action", "cause")),
 }
+_WARNINGS = {
+    event_id(f"commander_failsafe_enter_{name}")
+    for name in ("generic_warn", "warn", "low_bat", "crit_bat_warn", "crit_low_bat_warn", "low_flight_time_warn")
+}
 
 
-def failsafe_text(number: int, arguments: bytes) -> str:
-    """Return cause (if known) and action of the failsafe in an event, "" for other events."""
+def failsafe_text(number: int, arguments: bytes) -> str | None:
+    """Return cause (if known) and action of the failsafe in an event, "" of a warning, None for other events."""
     if number not in _LAYOUTS:
-        return ""
+        return "" if number in _WARNINGS else None
     layout, names = _LAYOUTS[number]
     values = dict(zip(names, struct.unpack_from(layout, arguments), strict=True))
     parts = [_name(CAUSES, values.get("cause", 0)), _name(ACTIONS, values["action"])]

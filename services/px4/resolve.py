@@ -79,9 +79,11 @@ def resolve(scene: Scene) -> ServiceConfig | None:
 def sensor_parameters(scene: Scene) -> dict[str, float]:
     """Return the PX4 parameters that describe the scene: delays of its sensors, rate of its IMU.
 
-    SIM_BAT_ENABLE = 0: PX4 gets the state of the plant's battery instead of its own simulation.
+    SIM_BAT_ENABLE = 0: PX4 gets the state of the plant's battery instead of its own simulation. COM_FLTT_LOW_ACT = 1
+    (warning): until mid-2026, PX4 takes the unknown remaining flight time of such a battery for 0 s, and would return
+    at once; 0 (no action) would hold for 5 s.
     """
     delays = latencies(scene, DELAYS)
-    result = {"SIM_BAT_ENABLE": 0.0, "EKF2_DELAY_MAX": max(DELAY_MAX, *delays.values()), **delays}
+    result = {"SIM_BAT_ENABLE": 0.0, "COM_FLTT_LOW_ACT": 1.0, "EKF2_DELAY_MAX": max(DELAY_MAX, *delays.values())}
     rate = scene.lookup(f"sensors.{ports.IMU}.rate")
-    return result | ({"IMU_INTEG_RATE": rate} if rate in IMU_RATES else {})
+    return result | delays | ({"IMU_INTEG_RATE": rate} if rate in IMU_RATES else {})

@@ -36,7 +36,7 @@ class Conventions(NamedTuple):
     open_value: float  # replaces NaN in the parameters of an item
     bytewise: bool  # integer parameters keep their bytes in the float field
     mode_name: Callable[[int], str]  # name of a heartbeat's custom_mode
-    event_text: Callable[[int, bytes], str] = lambda number, arguments: ""  # text of a failsafe's EVENT, "" for others
+    event_text: Callable[[int, bytes], str | None] = lambda number, arguments: None  # of a failsafe; "": only a warning
     parameters: Mapping[str, float] = MappingProxyType({})  # that a mission needs
 
 
@@ -267,8 +267,8 @@ class MissionClient:
 
     def _on_event(self, message: Any) -> None:
         text = self._conventions.event_text(message.id, bytes(message.arguments))
-        if self.armed and text:
-            self.texts.failsafe, self.texts.has_event = text, True
+        if self.armed and text is not None:
+            self.texts.add_event(text)
 
     def _on_statustext(self, message: Any) -> None:
         text = message.text.rstrip("\0").strip()  # PX4 ends texts that it also sends as events with a tab

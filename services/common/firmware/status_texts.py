@@ -23,6 +23,11 @@ class StatusTexts:
         """Clear the failsafe and the reasons from before arming."""
         self.failsafe, self.blockers = "", []
 
+    def add_event(self, text: str) -> None:
+        """Store the text of a failsafe's event; "" of a warning, with which PX4 also sends the status text."""
+        self.failsafe = text or ("" if self.failsafe.startswith(ACTIVATED) else self.failsafe)
+        self.has_event = True
+
     def add(self, text: str, severity: int, armed: bool, is_arming: bool) -> None:
         """Store a status text of a MAV_SEVERITY."""
         if severity <= mavlink.MAV_SEVERITY_ERROR:

@@ -76,7 +76,7 @@ def test_delays_of_sensors_are_parameters_of_firmware():
 
     assert parameters("sensors.barometer.latency_samples=2").items() >= {
         "SENS_GPS0_DELAY": 100.0, "EKF2_BARO_DELAY": 40.0, "EKF2_MAG_DELAY": 0.0, "IMU_INTEG_RATE": 250.0,
-        "EKF2_DELAY_MAX": 200.0, "SIM_BAT_ENABLE": 0.0,
+        "EKF2_DELAY_MAX": 200.0, "SIM_BAT_ENABLE": 0.0, "COM_FLTT_LOW_ACT": 1.0,
     }.items()  # fmt: skip
     assert parameters("sensors.gps.latency_samples=3")["EKF2_DELAY_MAX"] == 300.0
 

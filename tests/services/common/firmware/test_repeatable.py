@@ -123,6 +123,13 @@ def test_answers_differ_without_library(program, kind, tmp_path, load):
     assert len({digest(program, kind, tmp_path, ordered=False) for _ in range(3)}) > 1
 
 
+def test_commands_of_start_script_may_come_together(program, tmp_path):
+    """As with PX4's `ekf2 start &`. While the script runs, all answers are idle."""
+    with ExitStack() as stack:
+        simulator = Simulator(stack, program, "connect", tmp_path, extra=("together",))
+        assert any(simulator.step(number) != IDLE for number in range(200))
+
+
 def test_seed_varies_order_of_threads(program, tmp_path):
     digests = [digest(program, "send", tmp_path, seed=seed) for seed in (0, 1, 1, 2)]
     assert digests[1] == digests[2]

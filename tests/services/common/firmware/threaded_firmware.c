@@ -4,6 +4,7 @@
  *        with a further argument "spin", "barrier" or "foreign PORT": it breaks the rule of this name.
  */
 #include <arpa/inet.h>
+#include <poll.h>
 #include <pthread.h>
 #include <stdint.h>
 #include <stdio.h>
@@ -97,6 +98,7 @@ static uint64_t answer(uint64_t value) { /* to a message */
     pthread_join(t, NULL);
     return state;
 }
+static pthread_mutex_t commands = PTHREAD_MUTEX_INITIALIZER; /* as in PX4, also held while a connection is accepted */
 static void *handler(void *fd) { /* of a command of the start script */
     char data[64];
     ssize_t n = recv((int)(intptr_t)fd, data, sizeof data, 0);
@@ -104,13 +106,19 @@ static void *handler(void *fd) { /* of a command of the start script */
     mix(n);
     if (data[0] == 's') start_all();
     send((int)(intptr_t)fd, "ok", 2, MSG_NOSIGNAL);
+    pthread_mutex_lock(&commands);
     close((int)(intptr_t)fd);
+    pthread_mutex_unlock(&commands);
     return NULL;
 }
 static void *server(void *fd) {
     for (;;) {
-        int client = accept((int)(intptr_t)fd, NULL, NULL);
+        struct pollfd p = {(int)(intptr_t)fd, POLLIN, 0};
+        poll(&p, 1, -1);
+        pthread_mutex_lock(&commands);
+        int client = accept(p.fd, NULL, NULL);
         if (client >= 0) start(handler, client);
+        pthread_mutex_unlock(&commands);
     }
 }
 static int command(const char *path, const char *text) {
@@ -122,14 +130,15 @@ static int command(const char *path, const char *text) {
     send(fd, text, strlen(text), 0);
     return recv(fd, data, sizeof data, 0) == 2 ? 0 : 5;
 }
-static void run_script(const char *program, const char *path) {
+static void run_script(const char *program, const char *path, int together) {
     struct sockaddr_un own = {.sun_family = AF_UNIX};
     char text[1024];
     int fd = socket(AF_UNIX, SOCK_STREAM, 0);
     strncpy(own.sun_path, path, sizeof own.sun_path - 1);
     if (bind(fd, (void *)&own, sizeof own) || listen(fd, 5)) exit(6);
     start(server, fd);
-    snprintf(text, sizeof text, "for k in first start last; do '%s' client '%s' $k || exit 7; done", program, path);
+    snprintf(text, sizeof text, "for k in first start last; do '%s' client '%s' $k %s done; wait", program, path,
+             together ? "&" : "|| exit 7;");
     if (system(text)) exit(7);
 }
 int main(int count, char **arguments) {
@@ -145,7 +154,7 @@ int main(int count, char **arguments) {
     if (breaks) start(misbehave, 0);
     if (stream) {
         while (connect(fd, (void *)&at, sizeof at)) usleep(1000);
-        run_script(arguments[0], arguments[3]);
+        run_script(arguments[0], arguments[3], count > 4);
     } else start_all();
     if (!strcmp(kind, "bind")) {
         if (bind(fd, (void *)&at, sizeof at)) return 8;
