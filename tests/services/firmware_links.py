@@ -131,7 +131,7 @@ class Exchange:
             self._rows[port][0], self._samples[port] = pack_row(value), value
         if self._advance(self._code.memory, tick) != CONTINUE:
             raise self._block.failure(tick)
-        *duty, armed, landed, finished, text_id, _, _, _ = self._command[0]
+        *duty, armed, landed, finished, text_id, _, _, _, _ = self._command[0]
         order = self.link._config.order
         outputs = tuple(duty[order.index(k)] for k in range(len(order)))
         text = self._block.status_texts.table[int(text_id)]
