@@ -22,8 +22,8 @@ class ProcessEntry(NamedTuple):
     """Process of a run."""
 
     name: str
-    lock_step: bool  # block of the lock step; required if the run configuration has it
-    resolves: bool = False  # has a `resolve.py` although it is not block of the lock step
+    lock_step: bool  # part of the lock step; required if the run configuration has it
+    resolves: bool = False  # has a `resolve.py` although it is not part of the lock step
     optional: bool = False  # started only if its option is given; the run continues without it
     mode: str = "peer"  # mode of its Zenoh session
     foreign: bool = False  # flies a foreign firmware instead of the autopilot

@@ -98,7 +98,7 @@ def with_causes(outcome: FlightOutcome, flight: Flight) -> FlightOutcome:
     alarms = [
         Incident(event.time, _alarm(event.kind, event.text))
         for event in status_events(flight.topic("status"))
-        if outcome.failed and event.kind in ALARMS and event.time > begin and not event.text.endswith(": over")
+        if outcome.failed and event.kind in ALARMS and event.time > begin and not event.is_end
     ]
     time = begin if outcome.kind == "crashed" else outcome.time
     last = [Incident(end, outcome.how)] if outcome.failed and outcome.how else []
@@ -231,7 +231,7 @@ def _failures(flight: Flight, time: float) -> Iterator[Incident]:
     yield from _empty_battery(flight, time)
     last = stopped[0].time - STATUS_DELAY if stopped else time - ACTING
     for event in failsafes:
-        if time - BEFORE < event.time < last and not event.text.endswith(": over"):
+        if time - BEFORE < event.time < last and not event.is_end:
             yield Incident(event.time, f"failsafe ({event.text})")
             return  # later ones follow from the first
 

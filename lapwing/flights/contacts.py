@@ -78,9 +78,10 @@ def contacts(truth: TopicView, scene: Tables, others: Neighbours) -> list[Touch]
         return []
     ground, points = truth.ground_contact.astype(bool), _points(scene)
     on_obstacle, result = np.zeros(len(truth), bool), []
-    if "ground_contact" in _effects(scene):
+    has_contact = "ground_contact" in _effects(scene)
+    if has_contact:
         ground |= _jolted_by_ground(truth, scene, points)
-    for name, above, beyond in _obstacles(truth, scene, points) if "ground_contact" in _effects(scene) else ():
+    for name, above, beyond in _obstacles(truth, scene, points) if has_contact else ():
         distance = np.maximum(above, beyond).min(axis=1)
         touched = (distance <= TOUCHING) | _between_ticks(above, beyond)
         on_obstacle |= touched
@@ -206,17 +207,20 @@ def _between_ticks(above: np.ndarray, beyond: np.ndarray) -> np.ndarray:
 
 def _jolted_by_ground(truth: TopicView, scene: Tables, points: np.ndarray) -> np.ndarray:
     """Return True at rows before which a point has touched the ground for less than a tick, as a stiff foot does."""
-    result, relief = np.zeros(len(truth), bool), _relief(scene)
+    result = np.zeros(len(truth), bool)
     jolts = np.linalg.norm(np.diff(truth.velocity, axis=0), axis=1) > JOLT * np.diff(truth.times)
     jolts &= ~(truth.ground_contact[1:] | truth.ground_contact[:-1])
-    for row in np.flatnonzero(jolts[1:]) + 2:
+    rows = np.flatnonzero(jolts[1:]) + 2
+    relief = _relief(scene) if len(rows) else None  # its validation takes long
+    for row in rows:
         places = _places(truth, points, slice(row - 2, row))
-        above = places[..., 2] - np.array([[_ground_height(relief, *place) for place in places_] for places_ in places])
-        result[row] = (2.0 * above[1] - above[0] < 0.0).any()
+        ground = np.array([[_ground_height(relief, x, y) for x, y, _ in each] for each in places])
+        before, last = places[..., 2] - ground
+        result[row] = (2.0 * last - before < 0.0).any()
     return result
 
 
-def _ground_height(relief: Relief | None, x: float, y: float, z: float = 0.0) -> float:
+def _ground_height(relief: Relief | None, x: float, y: float) -> float:
     return 0.0 if relief is None else float(python_function(field)(relief, float(x), float(y))[0])
 
 

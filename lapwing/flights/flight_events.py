@@ -39,6 +39,7 @@ UNITS = {
     "airspeed": " Pa",
 }  # by channel, or by a sensor with one channel; fmt: skip
 ORDER = tuple(KINDS)  # order of simultaneous events
+OVER = ": over"  # end of the text of an event that ends a failsafe
 
 
 class Event(NamedTuple):
@@ -47,6 +48,11 @@ class Event(NamedTuple):
     time: float  # [s]
     kind: str  # one of lapwing.services.common.event_kinds.KINDS
     text: str
+
+    @property
+    def is_end(self) -> bool:
+        """True for the end of a failsafe."""
+        return self.text.endswith(OVER)
 
 
 def events(
@@ -173,7 +179,7 @@ def status_events(status: TopicView) -> Iterator[Event]:
         before = ""
         for time, reason in changes(t, np.where(status.failsafe, status.text.astype(object), "")):
             if reason or before:
-                yield Event(time, "failsafe", str(reason) or f"{before}: over")
+                yield Event(time, "failsafe", str(reason) or f"{before}{OVER}")
             before = reason
     if "failed_motor" in fields:
         yield from (

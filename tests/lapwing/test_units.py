@@ -134,7 +134,7 @@ def test_value_with_wrong_unit_is_rejected(key, value, message):
     assert message in str(error.value)
 
 
-def test_text_at_a_place_that_the_data_lacks_changes_nothing():
+def test_change_at_missing_place_returns_same_data():
     """Locations contain names of members of unions, and validation is repeated as long as the data change."""
     data = {"a": [{"b": "3 m"}]}
     assert _replaced(data, ("a", 0, "b"), 3.0) == {"a": [{"b": 3.0}]}

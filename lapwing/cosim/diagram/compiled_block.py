@@ -100,7 +100,7 @@ def bind(block: Block, ports: dict[str, Port], rows: dict[str, np.ndarray]) -> B
     """Compile or load a block, and bind it to the rows of its ports.
 
     Args:
-        block: block.
+        block: block to run.
         ports: ports by name.
         rows: ring buffer of each port by name, shape (2^k, width).
     """

@@ -75,4 +75,4 @@ def key_numbers(flight: FlightData) -> list[KeyNumber]:
 
 def trouble(flight: FlightData) -> list[Event]:
     """Return the adverse events in order of time, without the ends of failsafes."""
-    return [event for event in flight.events if event.kind in TROUBLE and not event.text.endswith(": over")]
+    return [event for event in flight.events if event.kind in TROUBLE and not event.is_end]

@@ -93,7 +93,7 @@ def test_cheapest_solver_of_the_own_flight_is_selected(accuracy, method, steps, 
     assert len(flown) == number  # from the cache
 
 
-def test_own_flight_uses_the_integrator_of_the_scene_and_refuses_what_it_misses(flown):
+def test_given_integrator_is_used_or_rejected_in_own_flight(flown):
     scene = ["solver.integrator=rk4_renormalised", "solver.accuracy"]
     assert solver_selection.overrides(load("hover", [scene[0], f"{scene[1]}=2e-7"]), lambda text: None)[1] == (
         f"solver.step={0.004 / 3!r}"

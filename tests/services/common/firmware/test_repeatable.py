@@ -124,7 +124,7 @@ def test_answers_differ_without_library(program, kind, tmp_path, load):
 
 
 def test_commands_of_start_script_may_come_together(program, tmp_path):
-    """As with PX4's `ekf2 start &`. While the script runs, all answers are idle."""
+    """Commands of PX4's `ekf2 start &` and the next line. While the script runs, all answers are idle."""
     with ExitStack() as stack:
         simulator = Simulator(stack, program, "connect", tmp_path, extra=("together",))
         assert any(simulator.step(number) != IDLE for number in range(200))

@@ -70,7 +70,7 @@ def test_output_is_fraction_of_battery_voltage():
 
 
 @pytest.mark.parametrize("follows", [True, False])
-def test_velocity_of_trajectory_is_unknown_while_firmware_does_not_follow_it(follows):
+def test_reference_velocity_is_nan_without_followed_trajectory(follows):
     command = InputSample(True, FirmwareCommand((0.0,) * 4, True, follows=follows))
     reference = Setpoint((1.0, 2.0, 3.0), (0.0, 0.0, -0.5), phase=2)
     inputs = command, InputSample(False, BatteryReading()), InputSample(True, reference)
