@@ -70,28 +70,31 @@ def _near(c, near, voltage, _):
 
 
 @generic(inline=True)
-def _supply(effects, drive, t, motion, h):
-    """Return (inputs, voltage [V] of each motor, True if the battery can begin or cease to limit one within h [s])."""
-    if not has_battery(effects):
-        return lambda effects, drive, t, motion, h: (inputs(drive, t, motion), drive.voltage, False)
+def _effects_switch(effects, drive, t, motion, h):
+    """Return True if an effect can switch, or the battery can begin or cease to limit a motor, within h [s]."""
+    if has_battery(effects):
 
-    def supply(effects, drive, t, motion, h):
-        s, rotors, _, _ = evaluate(drive, t, motion)
-        limit = hooks.battery_voltage(effects, drive.memory, total(rotors.power))
-        sag = abs(hooks.battery_voltage(effects, drive.memory, 0.0) - limit)
-        near = limit, SAG_RATE * s.layout.lag_rate * h * sag
-        return s, rotors.voltage, reduce_tuple(_near, near, False, drive.voltage, drive.voltage)
+        def switch(effects, drive, t, motion, h):
+            s, rotors, _, _ = evaluate(drive, t, motion)
+            limit = hooks.battery_voltage(effects, drive.memory, total(rotors.power))
+            sag = abs(hooks.battery_voltage(effects, drive.memory, 0.0) - limit)
+            near = limit, SAG_RATE * s.layout.lag_rate * h * sag
+            limiting = reduce_tuple(_near, near, False, drive.voltage, drive.voltage)
+            return limiting or hooks.all_switches(effects, drive.memory, s, rotors.voltage, h)
 
-    return supply
+        return switch
+    if not any(e.instance_class in hooks.HOOKS["switches"] for e in effects.types):
+        return lambda effects, drive, t, motion, h: False
+    return lambda effects, drive, t, motion, h: hooks.all_switches(
+        effects, drive.memory, inputs(drive, t, motion), drive.voltage, h
+    )
 
 
 @always_inline
 def switches(drive, t, x, h):
     """Return True if the loads can have a state-dependent jump or kink within h [s] after t [s]."""
     p, seen = drive.parameters, motion_of(drive.parameters.layout, x)
-    s, voltage, limiting = _supply(p.effects, drive, t, seen, h)
-    own = _form_switches(p.layout, x, h) or limiting
-    return own or hooks.all_switches(p.effects, drive.memory, s, voltage, h)
+    return _form_switches(p.layout, x, h) or _effects_switch(p.effects, drive, t, seen, h)
 
 
 @always_inline
@@ -142,14 +145,21 @@ def _memory_rates(effects, stiff, drive, t, motion):
     return rates
 
 
-@kernel
-def _awake_rate(drive, t, x):
-    p, body, memory, voltage = _with_memories(drive, x)
-    motion = motion_of(p.layout, x.motion)
+@always_inline
+def with_known_wrenches(drive, motion):
+    """Return (drive with the wrenches of stiff effects in their place, the rate of each one's memory, or ())."""
+    p, body, memory, voltage = drive
     effects, stiff = stiff_effects.with_wrenches(p.effects, memory, motion)
     parameters = MultirotorParameters(p.body, p.layout, effects, p.tolerance, p.summation)
-    known = MultirotorDrive(parameters, body, memory, voltage)
-    return AwakeState(_rate_of_form(known, t, x.motion), _memory_rates(p.effects, stiff, known, t, motion))
+    return MultirotorDrive(parameters, body, memory, voltage), stiff
+
+
+@kernel
+def _awake_rate(drive, t, x):
+    drive = _with_memories(drive, x)
+    effects, motion = drive.parameters.effects, motion_of(drive.parameters.layout, x.motion)
+    known, stiff = with_known_wrenches(drive, motion)
+    return AwakeState(_rate_of_form(known, t, x.motion), _memory_rates(effects, stiff, known, t, motion))
 
 
 @always_inline
