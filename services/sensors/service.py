@@ -14,9 +14,9 @@ from lapwing.dynamics.noise import Key
 from lapwing.dynamics.terrain import surface
 from lapwing.dynamics.vector import subtract
 from lapwing.dynamics.vehicles.visible_body import VisibleBody
-from lapwing.kernels import always_inline
+from lapwing.kernels import DispatchTable, always_inline
 from lapwing.kernels.cell import Cell
-from lapwing.kernels.codegen import compile_source, generic
+from lapwing.kernels.codegen import compile_source, dispatch, generic
 from lapwing.services.common import ports
 from lapwing.services.common.encoders import reading_encoder
 from lapwing.services.sensors.encoders import PORTS, topic_encoders
@@ -34,16 +34,8 @@ class Instrument(NamedTuple):
     others: tuple[VisibleBody, ...] = ()  # vehicles that it sees, in the order of its further inputs
 
 
-@generic(inline=True)
-def _sample(p: types.Type, s: types.Type, key: types.Type, tick: types.Type, truth: types.Type) -> Any:
-    """Call `sample` of the sensor with parameters `p`."""
-    return sys.modules[p.instance_class.__module__].sample
-
-
-@generic(inline=True)
-def _initial(p: types.Type, key: types.Type, truth: types.Type) -> Any:
-    """Call `initial` of the sensor with parameters `p`."""
-    return sys.modules[p.instance_class.__module__].initial
+_sample = dispatch(DispatchTable("sample"))
+_initial = dispatch(DispatchTable("initial"))
 
 
 @generic(inline=True)

@@ -100,7 +100,7 @@ def observe(p, tick, interval, state, command):
         hooks.all_winds(p.effects, state.memory, s.air.wind_world),
         s.body.mass,
         hooks.all_contacts(p.effects, state.memory, s),
-        hooks.all_battery_states(p.effects, state.memory, total(rotors.power), source),
+        hooks.battery_state(p.effects, state.memory, total(rotors.power), source),
     )
 
 

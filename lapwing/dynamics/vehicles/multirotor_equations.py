@@ -26,7 +26,7 @@ from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import ZERO, Vec3, product
 from lapwing.dynamics.vehicles.newton_euler import newton_euler
 from lapwing.kernels import DispatchTable, always_inline, noinline
-from lapwing.kernels.codegen import generic, map_tuple, reduce_tuple
+from lapwing.kernels.codegen import dispatch, generic, map_tuple, reduce_tuple
 
 PLAIN_TOLERANCE = 1e-13  # below it, the error of plain sums of the parts of a step can exceed the accuracy
 ROUNDING, MOST_ROUNDS = 1e-14, 16  # relative to the battery's voltage; of the iteration for it
@@ -88,6 +88,8 @@ class StateForm(NamedTuple):
 
 
 FORMS = DispatchTable()
+motion_of = dispatch(FORMS, 1, "motion")
+accelerations_of_form = dispatch(FORMS, 2, "accelerations")
 
 
 class MultirotorDrive(NamedTuple):
@@ -181,7 +183,7 @@ def _supplied(effects, drive, s, loads):
 
 def has_battery(effects: Any) -> bool:
     """Return True if an effect limits the motors' voltages, by the type of the tuple of effects."""
-    return any(e.instance_class in hooks.HOOKS["terminal_voltage"] for e in effects.types)
+    return any(e.instance_class in hooks.HOOKS["battery"] for e in effects.types)
 
 
 @always_inline
@@ -242,15 +244,3 @@ def accelerations(drive, t, motion):
 
 
 FORMS[Motion] = StateForm(_itself, rate, _itself, accelerations)
-
-
-@generic(inline=True)
-def motion_of(layout, x):
-    """Return the vehicle's Motion from any state form."""
-    return FORMS[x.instance_class].motion
-
-
-@generic(inline=True)
-def accelerations_of_form(drive, t, x):
-    """Return `accelerations` from any state form."""
-    return FORMS[x.instance_class].accelerations

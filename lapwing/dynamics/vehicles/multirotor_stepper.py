@@ -1,14 +1,15 @@
 """Integrator steps of a multirotor's communication step, with error control in contact."""
 
 import math
-import sys
 from typing import Any, NamedTuple
 
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.effects import _stiff_effects as stiff_effects
 from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.dynamics.integrators import (
+    INCREMENTS,
     SHORTEST,
+    STEPS,
     CompensatedSum,
     add,
     exact,
@@ -30,7 +31,7 @@ from lapwing.dynamics.vehicles.multirotor_equations import (
 )
 from lapwing.kernels import always_inline, kernel
 from lapwing.kernels import noinline as never_inlined
-from lapwing.kernels.codegen import generic, map_tuple, reduce_tuple
+from lapwing.kernels.codegen import dispatch, generic, map_tuple, reduce_tuple
 from lapwing.kernels.state_tree import finite, relative_difference
 
 BREAK_ROUNDING = 1e-6  # relative to a communication step: breakpoints this close to its ends count as the ends
@@ -39,10 +40,9 @@ SAG_RATE = 4.0  # largest relative rate of the battery's sag, over the rate of t
 
 @generic(inline=True)
 def _step(method, drive, t, x, h):
-    module = sys.modules[method.instance_class.__module__]
     if is_compensated(x):
-        return _compensated_step(module.increment, FORMS[x.types[0].instance_class])
-    one_step, form = module.step, FORMS[x.instance_class]
+        return _compensated_step(INCREMENTS[method.instance_class], FORMS[x.types[0].instance_class])
+    one_step, form = STEPS[method.instance_class], FORMS[x.instance_class]
     its_rate, project = form.rate, form.project
     # inlined into `advance`, so that constants of an interval are computed once
     return lambda method, drive, t, x, h: project(drive, one_step(its_rate, drive, t, x, h))
@@ -58,9 +58,9 @@ def _compensated_step(increment, form):
     return step
 
 
-@generic(inline=True)
-def _form_switches(layout, x, h):
-    return FORMS[x.instance_class].switches
+_form_switches = dispatch(FORMS, 1, "switches")
+_rate_of_form = dispatch(FORMS, 2, "rate")
+_project_form = dispatch(FORMS, 1, "project")
 
 
 @always_inline
@@ -120,16 +120,6 @@ class AwakeState(NamedTuple):
 @always_inline
 def _wake(layout, x):
     return motion_of(layout, x.motion)
-
-
-@generic(inline=True)
-def _rate_of_form(drive, t, x):
-    return FORMS[x.instance_class].rate
-
-
-@generic(inline=True)
-def _project_form(drive, x):
-    return FORMS[x.instance_class].project
 
 
 @always_inline
