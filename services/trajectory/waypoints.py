@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.geodesy import Home, geodetic_to_enu
+from lapwing.dynamics.validation import Table
 from lapwing.dynamics.vector import ZERO
 from lapwing.kernels import math, python_function
 from lapwing.kernels.math import dist
@@ -22,10 +23,10 @@ REST = 2.0  # [s] at the end
 SHORTEST = 1e-3  # [m] between neighbouring points
 
 
-class Waypoint(BaseModel):
+class Waypoint(Table):
     """A waypoint as a table: a place in metres or on the Earth, and optionally a heading."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(strict=False)
 
     x: Finite | None = None  # [m] displacement from the start along world x (east)
     y: Finite | None = None  # [m] along world y (north)
@@ -58,10 +59,10 @@ class Waypoint(BaseModel):
         return place if self.yaw_deg is None else [*place, math.radians(self.yaw_deg)]
 
 
-class Route(BaseModel):
+class Route(Table):
     """Waypoints, and the manner of flight between them."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(strict=False)
 
     waypoints: Points = ()  # [m] x, y, z, instead of phases; or tables: x, y or latitude_deg, longitude_deg; z; yaw_deg
     speed: Positive = 2.0  # [m/s] largest speed between waypoints

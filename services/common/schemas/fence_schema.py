@@ -14,10 +14,11 @@ Lapwing's autopilot acts on leaving the fence by its parameter FS_FENCE_ACT, and
 
 from typing import Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.validation import Table
 from lapwing.messages import OperatorCommand, Vector3
 from lapwing.services.common.firmware.schema import OWN, firmware_of, flown_by_firmware
 from lapwing.services.common.plans.fence import Fence
@@ -28,10 +29,9 @@ from lapwing.services.common.schemas.vehicle_schema import start_place
 SOURCE = "scene"
 
 
-class Area(BaseModel):
+class Area(Table):
     """A polygon or a circle, of any height."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
     corners: Annotated[tuple[Pair, ...], Field(strict=False, min_length=3)] | None = None  # [m] world x, y of a polygon
     position: Pair | None = None  # [m] world x and y of the centre of a circle, with radius, instead of corners
     radius: Length | None = None  # [m] of the circle

@@ -6,7 +6,7 @@ from types import ModuleType
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from numba import types
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
@@ -14,6 +14,7 @@ from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.multibody.five_bodies import FiveBodies
+from lapwing.dynamics.validation import Table
 from lapwing.dynamics.vehicles import multirotor_euler, multirotor_multibody
 from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters
 from lapwing.dynamics.vehicles.multirotor_multibody_equations import joints
@@ -72,10 +73,9 @@ LARGEST_TURN = 0.5  # [rad] of a propeller in a step of the redundant coordinate
 FORM = {"se3": multirotor_multibody, "euler": multirotor_euler}
 
 
-class Event(BaseModel):
+class Event(Table):
     """Failure of a propeller in flight, at `time`."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
     time: float = Field(ge=0.0)  # [s] moment of the failure
     propeller: int = Field(ge=1, le=4)  # in the order of the airframe
     failure: Literal["locked", "free", "torn_off"]  # locked to the chassis, disconnected from its motor, or torn off
