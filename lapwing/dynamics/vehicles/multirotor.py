@@ -23,7 +23,7 @@ from lapwing.dynamics.vehicles.multirotor_equations import (
     evaluate,
     motion_of,
 )
-from lapwing.dynamics.vehicles.multirotor_stepper import begin, steps, within
+from lapwing.dynamics.vehicles.multirotor_stepper import begin, steps, with_known_wrenches, within
 from lapwing.dynamics.vehicles.step_bound import parts
 from lapwing.kernels import kernel
 from lapwing.kernels.codegen import map_tuple
@@ -82,8 +82,10 @@ def observe(p, tick, interval, state, command):
     layout = p.layout
     voltage = map_tuple(within, layout.max_voltage, command, command)
     body = hooks.all_mass_properties(p.effects, state.memory, p.body)
-    u = StepInputs(p, body, state.memory, voltage)
-    s, rotors, _, _ = evaluate(u, tick * interval, motion_of(layout, state.motion))
+    motion = motion_of(layout, state.motion)
+    # what `_awake_rate` evaluates, which therefore is compiled once for both
+    u, _ = with_known_wrenches(StepInputs(p, body, state.memory, voltage), motion)
+    s, rotors, _, _ = evaluate(u, tick * interval, motion)
     linear, angular = accelerations_of_state(u, tick * interval, state.motion)
     # without a battery, a source of constant voltage delivers the power of the motors
     source = (math.nan, layout.max_voltage, total(rotors.power) / layout.max_voltage, math.nan)

@@ -58,7 +58,7 @@ def _compensated_step(increment, formulation):
     return step
 
 
-_form_switches = dispatch(FORMULATIONS, 1, "switches")
+_switches_of_state = dispatch(FORMULATIONS, 1, "switches")
 _rate_of_state = dispatch(FORMULATIONS, 2, "rate")
 _project_state = dispatch(FORMULATIONS, 1, "project")
 
@@ -70,28 +70,29 @@ def _near(c, near, voltage, _):
 
 
 @generic(inline=True)
-def _supply(effects, u, t, motion, h):
-    """Return (inputs, voltage [V] of each motor, True if the battery can begin or cease to limit one within h [s])."""
-    if not has_battery(effects):
-        return lambda effects, u, t, motion, h: (inputs(u, t, motion), u.voltage, False)
+def _effects_switch(effects, u, t, motion, h):
+    """Return True if an effect can switch, or the battery can begin or cease to limit a motor, within h [s]."""
+    if has_battery(effects):
 
-    def supply(effects, u, t, motion, h):
-        s, rotors, _, _ = evaluate(u, t, motion)
-        limit = hooks.battery_voltage(effects, u.memory, total(rotors.power))
-        sag = abs(hooks.battery_voltage(effects, u.memory, 0.0) - limit)
-        near = limit, SAG_RATE * s.layout.lag_rate * h * sag
-        return s, rotors.voltage, reduce_tuple(_near, near, False, u.voltage, u.voltage)
+        def switch(effects, u, t, motion, h):
+            s, rotors, _, _ = evaluate(u, t, motion)
+            limit = hooks.battery_voltage(effects, u.memory, total(rotors.power))
+            sag = abs(hooks.battery_voltage(effects, u.memory, 0.0) - limit)
+            near = limit, SAG_RATE * s.layout.lag_rate * h * sag
+            limiting = reduce_tuple(_near, near, False, u.voltage, u.voltage)
+            return limiting or hooks.all_switches(effects, u.memory, s, rotors.voltage, h)
 
-    return supply
+        return switch
+    if not any(e.instance_class in hooks.HOOKS["switches"] for e in effects.types):
+        return lambda effects, u, t, motion, h: False
+    return lambda effects, u, t, motion, h: hooks.all_switches(effects, u.memory, inputs(u, t, motion), u.voltage, h)
 
 
 @always_inline
 def switches(u, t, x, h):
     """Return True if the loads can have a state-dependent jump or kink within h [s] after t [s]."""
     p, seen = u.parameters, motion_of(u.parameters.layout, x)
-    s, voltage, limiting = _supply(p.effects, u, t, seen, h)
-    own = _form_switches(p.layout, x, h) or limiting
-    return own or hooks.all_switches(p.effects, u.memory, s, voltage, h)
+    return _switches_of_state(p.layout, x, h) or _effects_switch(p.effects, u, t, seen, h)
 
 
 @always_inline
@@ -140,14 +141,21 @@ def _memory_rates(effects, stiff, u, t, motion):
     return rates
 
 
-@kernel
-def _awake_rate(u, t, x):
-    p, body, memory, voltage = _with_memories(u, x)
-    motion = motion_of(p.layout, x.motion)
+@always_inline
+def with_known_wrenches(u, motion):
+    """Return (step inputs with the wrenches of stiff effects in their place, the rate of each one's memory, or ())."""
+    p, body, memory, voltage = u
     effects, stiff = stiff_effects.with_wrenches(p.effects, memory, motion)
     parameters = MultirotorParameters(p.body, p.layout, effects, p.tolerance, p.summation)
-    known = StepInputs(parameters, body, memory, voltage)
-    return AwakeState(_rate_of_state(known, t, x.motion), _memory_rates(p.effects, stiff, known, t, motion))
+    return StepInputs(parameters, body, memory, voltage), stiff
+
+
+@kernel
+def _awake_rate(u, t, x):
+    u = _with_memories(u, x)
+    effects, motion = u.parameters.effects, motion_of(u.parameters.layout, x.motion)
+    known, stiff = with_known_wrenches(u, motion)
+    return AwakeState(_rate_of_state(known, t, x.motion), _memory_rates(effects, stiff, known, t, motion))
 
 
 @always_inline
