@@ -15,11 +15,11 @@ from lapwing.dynamics.effects._types import AnyMassProperties, Motion, PerRotor,
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
 from lapwing.dynamics.vector import ZERO, Vec3
 from lapwing.dynamics.vehicles.multirotor_equations import (
-    MultirotorDrive,
     MultirotorParameters,
     MultirotorState,
     RotorLayout,
-    accelerations_of_form,
+    StepInputs,
+    accelerations_of_state,
     evaluate,
     motion_of,
 )
@@ -70,9 +70,9 @@ def advance(method, p, key, tick, state, command, h, n):
     """
     interval = n * h
     start = tick * interval
-    drive = begin(p, key, tick, state, command, interval)
-    split = parts(p, motion_of(p.layout, state.motion), drive.memory, h)
-    x, memory = steps(method, drive, state.motion, start, start + interval, h / split, 0, n * split)
+    u = begin(p, key, tick, state, command, interval)
+    split = parts(p, motion_of(p.layout, state.motion), u.memory, h)
+    x, memory = steps(method, u, state.motion, start, start + interval, h / split, 0, n * split)
     return MultirotorState(x, memory)
 
 
@@ -84,9 +84,9 @@ def observe(p, tick, interval, state, command):
     body = hooks.all_mass_properties(p.effects, state.memory, p.body)
     motion = motion_of(layout, state.motion)
     # what `_awake_rate` evaluates, which therefore is compiled once for both
-    drive, _ = with_known_wrenches(MultirotorDrive(p, body, state.memory, voltage), motion)
-    s, rotors, _, _ = evaluate(drive, tick * interval, motion)
-    linear, angular = accelerations_of_form(drive, tick * interval, state.motion)
+    u, _ = with_known_wrenches(StepInputs(p, body, state.memory, voltage), motion)
+    s, rotors, _, _ = evaluate(u, tick * interval, motion)
+    linear, angular = accelerations_of_state(u, tick * interval, state.motion)
     # without a battery, a source of constant voltage delivers the power of the motors
     source = (math.nan, layout.max_voltage, total(rotors.power) / layout.max_voltage, math.nan)
     return MultirotorObservation(
