@@ -6,6 +6,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import time
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -67,8 +68,9 @@ class Simulator:
             self.socket.listen()
         self.process = subprocess.Popen(
             [program, kind, *map(str, (*arguments, *extra))], env=environment, start_new_session=True,
-            pass_fds=(self.library.child.fileno(),) if ordered else (),
+            pass_fds=(self.library.child.fileno(),) if ordered else (), stdout=subprocess.PIPE,
         )  # fmt: skip
+        stack.callback(self.process.stdout.close)
         stack.callback(self.process.wait)
         stack.callback(self.process.kill)
         self.peer = (HOST, state)
@@ -136,6 +138,18 @@ def test_seed_varies_order_of_threads(program, tmp_path):
     digests = [digest(program, "send", tmp_path, seed=seed) for seed in (0, 1, 1, 2)]
     assert digests[1] == digests[2]
     assert len(set(digests)) == 3
+
+
+def test_clock_follows_real_time_once_the_link_is_closed(program, tmp_path):
+    with ExitStack() as stack:
+        simulator = Simulator(stack, program, "send", tmp_path, extra=("alone",))
+        simulator.step(0)
+        simulator.library.close()
+        start = time.monotonic()
+        os.read(simulator.process.stdout.fileno(), 1)
+        for _ in range(5):  # its wait for a message ends after 0.1 s
+            os.read(simulator.process.stdout.fileno(), 1)
+        assert time.monotonic() - start > 0.5
 
 
 @pytest.mark.long
