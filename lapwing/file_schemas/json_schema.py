@@ -16,6 +16,7 @@ from lapwing.services.autopilot import gains
 from lapwing.services.autopilot.gains import GainSet
 from lapwing.services.common import autopilot_parameters
 from lapwing.services.common.autopilot_parameters import Parameter
+from lapwing.services.common.schemas.place_schema import PlaceTable
 from lapwing.services.plant import models
 from lapwing.services.scene_resolver import load, vocabulary
 from lapwing.services.sensors.fault_schedule import SLOTS, FaultTable
@@ -76,6 +77,10 @@ def scene_schema() -> Schema:
     points = tables["trajectory"]["properties"]["waypoints"]
     in_metres = points["items"] | {"description": "[m] x, y, z; a fourth number is the yaw in rad"}
     points["items"] = {"anyOf": [in_metres, table_schema(Waypoint)]}
+    for areas in tables["fence"]["properties"].values():
+        area = areas["items"]["properties"]
+        area["position"] = _in_metres_or_place(area["position"])
+        area["corners"]["items"] = _in_metres_or_place(area["corners"]["items"])
     phase = tables["trajectory"]["properties"]["phase"]["items"]["properties"]
     segment = {"$ref": "#/definitions/segment"}
     for channel in CHANNELS:
@@ -91,6 +96,11 @@ def scene_schema() -> Schema:
     needed = [name for name, table in tables.items() if "required" in table and not sections[name].OPTIONAL]
     result = {**_head("Lapwing scene"), **closed_table(tables), **required_keys(needed)}
     return {**result, "definitions": {"segment": {"anyOf": [*map(_segment, KINDS), USER_SEGMENT]}}}
+
+
+def _in_metres_or_place(pair: Schema) -> Schema:
+    """Return the schema of a place: two numbers [m], or a table."""
+    return {"description": pair.get("description", "[m] x, y"), "anyOf": [pair, table_schema(PlaceTable)]}
 
 
 def airframe_schema() -> Schema:
@@ -203,7 +213,7 @@ def _parameters() -> Schema:
 
 
 def _parameter(p: Parameter) -> Schema:
-    kind = "integer" if p.whole else "number"
+    kind = "integer" if p.integer else "number"
     unit = f"[{p.unit}] " if p.unit else ""
     return {"type": kind, "minimum": p.least, "maximum": p.most, "default": p.default, "description": unit + p.meaning}
 

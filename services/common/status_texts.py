@@ -8,10 +8,12 @@ BATTERY_LOW = "the battery is low"
 LINK_LOST = "the ground station is lost"
 SETPOINTS_LOST = "the offboard setpoints are lost"
 FENCE_LEFT = "the vehicle has left the fence"
+KEEP_OUT_ENTERED = "the vehicle has entered a keep-out area"
+TOO_FAR, TOO_HIGH = "the vehicle is too far from home", "the vehicle is too high above home"
 STICKS_LOST = "the sticks are lost"
 FAILSAFES = (
     POSITION_LOST, MOTOR_FAILED, BATTERY_EMPTY, BATTERY_CRITICAL, BATTERY_LOW, LINK_LOST, SETPOINTS_LOST, FENCE_LEFT,
-    STICKS_LOST,
+    STICKS_LOST, KEEP_OUT_ENTERED, TOO_FAR, TOO_HIGH,
 )  # fmt: skip
 """Failsafe reasons; the index is the reason's event number."""
 
@@ -20,7 +22,7 @@ NO_READINGS = "no good readings of the {}"  # sensor
 POSITION_UNCERTAIN = "the position is uncertain"
 ATTITUDE_UNCERTAIN = "the attitude is uncertain"
 NOT_LEVEL = "the vehicle is not level"
-OUTSIDE_FENCE = "the vehicle is outside the fence"
+OUTSIDE_FENCE, IN_KEEP_OUT = "the vehicle is outside the fence", "the vehicle is in a keep-out area"
 """Arming blockers; BATTERY_LOW followed by the charge is another."""
 
 ARMED, DISARMED, LANDED = "armed", "disarmed: {}", "landed"

@@ -33,7 +33,6 @@ channels hold.
 import csv
 import math
 from collections.abc import Callable, Iterator
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, ClassVar, Literal
 
@@ -42,11 +41,11 @@ from pydantic import model_validator
 from lapwing.cosim.scene import Files, KeyOrigin, Scene, SceneError, SceneTable
 from lapwing.cosim.scene.files import unvalidated_value
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.geodesy import Home
 from lapwing.dynamics.terrain import Level, surface
 from lapwing.dynamics.validation import validated
 from lapwing.services.common import user_modules
-from lapwing.services.common.schemas.environment_schema import EnvironmentTable, environment
+from lapwing.services.common.schemas.environment_schema import environment
+from lapwing.services.common.schemas.place_schema import home_of
 from lapwing.services.common.schemas.vehicle_schema import Vehicle, start_place
 from lapwing.services.trajectory import phases, waypoints
 from lapwing.services.trajectory.phases import Phases
@@ -117,11 +116,9 @@ class Trajectory(Route, Phases, SceneTable):
 
 def _place(tree: dict[str, Any], key: str, point: dict[str, Any]) -> list[float]:
     """Return a waypoint in metres. Raise ConfigError with its key in the scene."""
-    home, start = Home(), unvalidated_value(tree, Vehicle.TABLE, "initial_position") or (0.0, 0.0)
-    with suppress(TypeError):  # an invalid home, or start, is reported with its key when its table is validated
-        home = Home(**unvalidated_value(tree, EnvironmentTable.TABLE, "home") or {})
+    start = unvalidated_value(tree, Vehicle.TABLE, "initial_position") or (0.0, 0.0)
     try:
-        return validated(Waypoint.model_validate, point, Waypoint).point(home, start)
+        return validated(Waypoint.model_validate, point, Waypoint).point(home_of(tree), start)
     except ConfigError as error:
         raise error.with_prefix(key) from None
 

@@ -4,13 +4,15 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.geodesy import Home, geodetic_to_enu
+from lapwing.dynamics.geodesy import Home
+from lapwing.dynamics.validation import Table
 from lapwing.dynamics.vector import ZERO
-from lapwing.kernels import math, python_function
+from lapwing.kernels import math
 from lapwing.kernels.math import dist
+from lapwing.services.common.schemas.place_schema import PlaceTable
 from lapwing.services.trajectory.segments.segment import Finite, Positive
 
 Point = Annotated[tuple[Finite, ...], Field(strict=False, min_length=3, max_length=4)]
@@ -22,46 +24,22 @@ REST = 2.0  # [s] at the end
 SHORTEST = 1e-3  # [m] between neighbouring points
 
 
-class Waypoint(BaseModel):
+class Waypoint(PlaceTable):
     """A waypoint as a table: a place in metres or on the Earth, and optionally a heading."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    x: Finite | None = None  # [m] displacement from the start along world x (east)
-    y: Finite | None = None  # [m] along world y (north)
-    latitude_deg: Annotated[float, Field(ge=-90.0, le=90.0)] | None = None  # [deg] with longitude_deg, instead of x, y
-    longitude_deg: Annotated[float, Field(ge=-180.0, le=180.0)] | None = None  # [deg] east
     z: Finite  # [m] height above the ground at the start
     yaw_deg: Finite | None = None  # [deg] heading at the point, relative to that at the start, counter-clockwise
 
     def point(self, home: Home, start: tuple[float, float]) -> list[float]:
-        """Return x, y, z [m] and, if it is given, the yaw [rad].
-
-        Args:
-            home: origin of the world frame.
-            start: world x and y of the vehicle's start [m].
-
-        Raises:
-            ConfigError: the place is missing, or given twice.
-        """
-        pairs = [(self.x, self.y), (self.latitude_deg, self.longitude_deg)]
-        given = [pair for pair in pairs if pair != (None, None)]
-        if len(given) != 1 or None in given[0]:
-            names = ", ".join(sorted(self.model_fields_set))
-            raise ConfigError("", f"got {names}", "x and y, or latitude_deg and longitude_deg")
-        if self.x is not None and self.y is not None:
-            place = [self.x, self.y, self.z]
-        else:
-            height = home.height + self.z
-            x, y, _ = python_function(geodetic_to_enu)(home, self.latitude_deg, self.longitude_deg, height)
-            place = [x - start[0], y - start[1], self.z]
+        """Return x, y, z [m] and, if it is given, the yaw [rad]. See `east_north` for arguments and errors."""
+        place = [*self.east_north(home, start, self.z), self.z]
         return place if self.yaw_deg is None else [*place, math.radians(self.yaw_deg)]
 
 
-class Route(BaseModel):
+class Route(Table):
     """Waypoints, and the manner of flight between them."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(strict=False)
 
     waypoints: Points = ()  # [m] x, y, z, instead of phases; or tables: x, y or latitude_deg, longitude_deg; z; yaw_deg
     speed: Positive = 2.0  # [m/s] largest speed between waypoints

@@ -180,12 +180,12 @@ def test_service_that_is_killed_is_named_in_the_report(tmp_path):
     assert found[1] in (tmp_path / "a.html").read_text()
 
 
-def test_termination_outside_fence_names_it_and_lasts_until_the_impact(lapwing):
+def test_termination_at_maximum_height_names_it_and_lasts_until_the_impact(lapwing):
     fence = ("autopilot.parameters.FS_FENCE_ACT=5", "autopilot.parameters.GF_MAX_VER_DIST=4.0")
     climb = 'trajectory.phase.0.z={kind="minimum_jerk", to=8.0, duration=4.0}'
     words, reported, (flight,), _ = crash(lapwing, "hover", *[a for x in (*fence, climb) for a in ("--set", x)])
     found = re.search(
-        r"Crashed at (\S+) s: the vehicle has left the fence: the autopilot stopped the motors in flight, (\S+) m "
+        r"Crashed at (\S+) s: the vehicle is too high above home: the autopilot stopped the motors in flight, (\S+) m "
         r"above ground, at (\S+) m/s, at (\S+) s; hit the ground at (\S+) m/s, ",
         words,
     )
@@ -196,7 +196,7 @@ def test_termination_outside_fence_names_it_and_lasts_until_the_impact(lapwing):
     assert impact - start == pytest.approx((speed + fall) / 9.80665, rel=0.05)
     assert flight.truth.times[-1] < impact + 5.0
     assert [event["text"] for event in reported["events"] if event["kind"] == "failsafe"] == [
-        "the vehicle has left the fence"
+        "the vehicle is too high above home"
     ]
 
 

@@ -11,17 +11,18 @@ import math
 import sys
 from collections.abc import Callable
 from contextlib import suppress
+from functools import cache
 from pathlib import Path
 
 from lapwing.cosim.complete_file import complete_file
 from lapwing.cosim.scene import KeyOrigin, Scene, SceneError
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.kernels import cache_folder, source_digest
+from lapwing.kernels import cache_folder
 from lapwing.services.common.schemas.communication_schema import Communication
 from lapwing.services.common.schemas.run_schema import Run
 from lapwing.services.common.schemas.vehicle_schema import Effects, Vehicle
 from lapwing.services.plant.schema import Solver, accuracy_to_select_for
-from lapwing.services.scene_resolver import load, resolve
+from lapwing.services.scene_resolver import load
 from lapwing.studies.accuracy import flight_accuracy, own_flight, plant, scenes
 from lapwing.studies.accuracy.error_budget import acting_on_neighbours
 from lapwing.studies.accuracy.problem import SolverMethod
@@ -31,7 +32,7 @@ CANDIDATES = ("rkmk2", "rk4_renormalised", "rkmk54", "rk8_renormalised")  # each
 IMPACT_SHARE = 3e-3  # of the accuracy, because an impact amplifies position errors to 300 times larger velocity errors
 JUMP_SHARE = 0.125  # of the accuracy while voltages jump, because the largest error of such flights is 7 times larger
 MOST_STEPS = 32  # per communication step, half of those of the reference: the finest step that is tried
-SOURCES = "dynamics", "services"  # packages of which all modules decide on a measurement
+SOURCES = "kernels", "dynamics", "cosim", "services", "studies/accuracy"  # folders that decide on a measurement
 HIDDEN = 2.0  # factor by which a finer step errs more if the longer one is under error control
 
 
@@ -70,7 +71,7 @@ def _for_own_flight(scene: Scene, accuracy: float, notify: Callable[[str], None]
     if not own_flight.has_known_commands(scene):
         return None
     first = scene.each_vehicle[0]
-    more = f"{accuracy!r} {own_flight.reference_config(scene, accuracy).resolved!r}"
+    more = f"{accuracy!r} {scene.resolved!r}"
     path = _cache_file(first, _names(first, own_flight.CANDIDATES), more)
     if path and path.is_file():
         with suppress(OSError, ValueError):
@@ -111,7 +112,7 @@ def _warn_of_neighbours(scene: Scene, chosen: list[str], accuracy: float, notify
     if not names:
         return
     first = scene.each_vehicle[0]
-    path, error = _cache_file(first, tuple(chosen), repr(resolve(load(scene, chosen)).resolved)), math.nan
+    path, error = _cache_file(first, tuple(chosen), repr(scene.resolved)), math.nan
     if path and path.is_file():
         with suppress(OSError, ValueError):
             error = float(path.read_text(encoding="utf-8"))
@@ -212,15 +213,21 @@ def _read(path: Path) -> list[list[Point]]:
     return []
 
 
+@cache
+def _sources() -> bytes:
+    """Return a digest of the files in SOURCES; their bytes, because imports take 40 times as long to follow."""
+    root, digest = Path(__file__).parents[2], hashlib.blake2b()
+    for file in sorted(file for part in SOURCES for file in (root / part).rglob("*.py")):
+        digest.update(str(file.relative_to(root)).encode() + file.read_bytes())
+    return digest.digest()
+
+
 def _cache_file(scene: Scene, names: tuple[str, ...], more: str = "") -> Path | None:
     """Return the cache file, named by a digest of sources, integrators, plant and `more`; None without a cache."""
     folder = cache_folder()
     if folder is None:
         return None
-    root = Path(__file__).parents[2]
-    files = [file.relative_to(root) for part in SOURCES for file in sorted((root / part).rglob("*.py"))]
-    modules = [__name__, *(".".join(("lapwing", *file.with_suffix("").parts)) for file in files)]
-    digest = hashlib.blake2b(source_digest(modules).encode(), digest_size=8)
+    digest = hashlib.blake2b(_sources(), digest_size=8)
     run, manoeuvres = scene[Run], [voltages.__name__ for voltages in plant.MANOEUVRES]
     flight = names, manoeuvres, run.seed, scene[Vehicle].name, run.duration, scene[Communication].rate
     for part in (*flight, dict(scene[Effects].tables), scenes.physics(scene), *filter(None, [more])):

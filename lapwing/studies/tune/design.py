@@ -2,6 +2,7 @@
 
 import math
 from collections.abc import Callable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -55,7 +56,21 @@ def gain_set(model: Hover, bandwidths: Bandwidths) -> GainSet:
     )
 
 
-def shortfalls(loops: dict[str, np.ndarray]) -> dict[str, str]:
+class Shortfall(NamedTuple):
+    """Reason why a loop has not the required margins."""
+
+    reason: str  # the same for all loops with this fault
+    value: str = ""  # with its unit
+
+    def __str__(self) -> str:
+        """Return the reason, with the value if there is one."""
+        return f"{self.reason} ({self.value})" if self.value else self.reason
+
+
+UNSTABLE = Shortfall("unstable")
+
+
+def shortfalls(loops: dict[str, np.ndarray]) -> dict[str, Shortfall]:
     """Return the fault of each loop that is unstable, has too small a margin, or is unstable at a corner."""
     result = {}
     for name, response in loops.items():
@@ -63,15 +78,16 @@ def shortfalls(loops: dict[str, np.ndarray]) -> dict[str, str]:
         # Only the single loops and the cuts at the motors scale with the vehicle's gain.
         scaled = CORNERS if name in ("altitude", "yaw", "x_plant_input", "y_plant_input") else ()
         if not stable(response):
-            result[name] = "unstable"
+            result[name] = UNSTABLE
         elif not 0.0 < m.crossover < math.inf:
-            result[name] = f"gain {'above' if m.crossover else 'below'} 1 up to {FREQUENCIES[-1]:g} rad/s"
+            result[name] = Shortfall(f"gain {'above' if m.crossover else 'below'} 1 up to {FREQUENCIES[-1]:g} rad/s")
         elif math.degrees(m.phase) < PHASE_MARGIN:
-            result[name] = f"phase margin {math.degrees(m.phase):.1f} deg, below {PHASE_MARGIN:g}"
+            result[name] = Shortfall(f"phase margin below {PHASE_MARGIN:g} deg", f"{math.degrees(m.phase):.1f} deg")
         elif min(_decibel(m.gain), -_decibel(m.reduction)) < GAIN_MARGIN:
-            result[name] = f"gain margin {_decibel(m.gain):.1f}/{_decibel(m.reduction):.1f} dB, below {GAIN_MARGIN:g}"
+            value = f"{_decibel(m.gain):.1f}/{_decibel(m.reduction):.1f} dB"
+            result[name] = Shortfall(f"gain margin below {GAIN_MARGIN:g} dB", value)
         elif not all(stable(k * response) for k in scaled):
-            result[name] = "unstable with errors of 20 % in mass, inertia or thrust"
+            result[name] = Shortfall("unstable with errors of 20 % in mass, inertia or thrust")
     return result
 
 
@@ -110,7 +126,7 @@ def design(
     raise ValueError(f"no gains with {PHASE_MARGIN:g} deg and {GAIN_MARGIN:g} dB found: {fault}; use lower bandwidths")
 
 
-def _owner(name: str, faults: dict[str, str]) -> str:
+def _owner(name: str, faults: dict[str, Shortfall]) -> str:
     """Return the bandwidth responsible for a loop: the inner one of a cascade first."""
     if name in ("altitude", "yaw"):
         return name

@@ -1,6 +1,5 @@
 """Procedure of `lapwing tune`: linear model, present gains, design for margins, refinement in simulated flights."""
 
-import re
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import NamedTuple
@@ -22,7 +21,7 @@ from lapwing.services.common.schemas.vehicle_schema import Vehicle
 from lapwing.studies.campaign.campaign_config import campaign_config
 from lapwing.studies.tune import corners, gain_refinement
 from lapwing.studies.tune.bandwidths import Bandwidths
-from lapwing.studies.tune.design import DELAY, assumed_airframe, design, gain_set, shortfalls
+from lapwing.studies.tune.design import DELAY, Shortfall, assumed_airframe, design, gain_set, shortfalls
 from lapwing.studies.tune.identify import Identification, identify
 from lapwing.studies.tune.linearise import Hover, hover
 
@@ -33,7 +32,7 @@ class GainReview(NamedTuple):
     name: str
     parameters: Parameters
     margins: dict[str, Margins]
-    shortfalls: dict[str, str]
+    shortfalls: dict[str, Shortfall]
 
 
 class Tuning(NamedTuple):
@@ -130,12 +129,11 @@ def _review(name: str, parameters: Parameters, plant: Airframe, tick: float) -> 
     )
 
 
-def _by_reason(shortfalls: Mapping[str, str]) -> list[str]:
+def _by_reason(shortfalls: Mapping[str, Shortfall]) -> list[str]:
     """Return a text for each reason, such as "phase margin below 45 deg: roll, pitch loop", from `shortfalls`."""
     loops: dict[str, list[str]] = {}
-    for name, why in shortfalls.items():
-        reason = re.sub(r" [-+./\d]+ (deg|dB), below (\d+)", r" below \2 \1", why)
-        loops.setdefault(reason, []).append(LOOP_WORDS[name].removesuffix(" loop"))
+    for name, shortfall in shortfalls.items():
+        loops.setdefault(shortfall.reason, []).append(LOOP_WORDS[name].removesuffix(" loop"))
     return [f"{reason}: {', '.join(names)} loop" for reason, names in loops.items()]
 
 

@@ -11,7 +11,7 @@ from lapwing.flights.tracking import AXES, unit_and_factor
 from lapwing.services.autopilot.margins import LOOP_WORDS, Margins
 from lapwing.studies.tune import systems
 from lapwing.studies.tune.corners import failure
-from lapwing.studies.tune.design import DELAY
+from lapwing.studies.tune.design import DELAY, UNSTABLE
 from lapwing.studies.tune.gain_refinement import rmse
 from lapwing.studies.tune.identify import LOOPS
 from lapwing.studies.tune.procedure import GainReview, Tuning
@@ -180,7 +180,7 @@ def _steps(reviews: tuple[GainReview, ...], loops: list[dict]) -> Plot:
         for review, systems_of, (colour, dash) in zip(reviews, loops, LINE_STYLES, strict=True):
             seconds = 1.5 if axis == "yaw" else 4.0
             inner = f"{loop}_plant_input"  # an outer loop is unstable with its inner one
-            if "unstable" in (review.shortfalls.get(loop), review.shortfalls.get(inner)):
+            if UNSTABLE in (review.shortfalls.get(loop), review.shortfalls.get(inner)):
                 notes.append(f"{review.name}: unstable")
                 continue
             response = systems.step(systems_of[loop], seconds)

@@ -9,13 +9,21 @@ from lapwing.cosim.scene import Scene
 from lapwing.cosim.scene.load import SCENE_FILE
 from lapwing.cosim.scene.toml_text import toml
 from lapwing.file_schemas.annotations import Schema, dereference
+from lapwing.services.common.firmware.schema import OWN
 
-FIRST = ("trajectory", "effects", "vehicle", "run", "environment", "sensors", "autopilot", "solver", "communication")
+FIRST = (
+    *("trajectory", "effects", "fence", "vehicle", "run", "environment"),
+    *("sensors", "autopilot", "solver", "communication"),
+)
 PER_VEHICLE = ("airframe", "mavlink")  # tables of the single vehicles of a fleet
 OPEN = ("run", "vehicle", "effects", "trajectory")  # tables that are initially open
 HIDDEN = ("published", "services", "meshes", "ros2")  # tables without influence on the flight, or too large
 FIXED = ("run.title", "run.real_time_factor", "vehicle.name")  # keys that the form does not change
 EXTENSIBLE = ("effects", "sensors")  # tables to which the form can add tables
+PLACED = (  # lists that the 3D view edits, in metres; each is one field
+    *("environment.terrain.box", "environment.terrain.cylinder", "fence.keep_in", "fence.keep_out"),
+    "trajectory.waypoints",
+)
 MOST_ITEMS = 40  # largest number of elements with fields in a list of tables
 LONGEST = 2000  # largest number of characters of a value in the form
 _UNITS = re.compile(r"\[([^\]]*(?:\], \[[^\]]*)*)\]\s*")  # "[m] ...", or "[s], [m] ..." for the elements of a list
@@ -62,6 +70,8 @@ def form(scene: Scene, schema: Schema) -> list[Group]:
     resolved = scene.resolved
     member = resolved["vehicle"][0] if scene.vehicles else {}
     tables = {**{name: table for name, table in member.items() if name != "vehicle"}, **resolved}
+    if tables.get("autopilot", {}).get("firmware") == OWN:  # others have a fence of their own
+        tables.setdefault("fence", {})
     names = [name for name in (*FIRST, *sorted(set(tables) - set(FIRST))) if name in tables and name not in HIDDEN]
     reader = _Reader(schema)
     groups = []
@@ -85,6 +95,28 @@ def additions(scene: Scene, schema: Schema) -> list[tuple[str, str]]:
         for key, part in schema["properties"][name]["properties"].items()
         if not any(key in tree.get(name, {}) for tree in present)
     ]
+
+
+def starting_values(schema: Schema, key: str) -> dict[str, Any]:
+    """Return values of the required keys of an added table: neutral ones where the schema allows them."""
+    part = schema
+    for name in key.split("."):
+        part = dereference(schema, part["properties"][name])
+    part = next((choice for choice in part.get("anyOf", ()) if "module" not in choice.get("required", ())), part)
+    return {name: _starting_value(part["properties"][name]) for name in part.get("required", ())}
+
+
+def _starting_value(part: Schema) -> Any:
+    part = part.get("anyOf", [part])[0]
+    if "enum" in part:
+        return part["enum"][0]
+    if part.get("type") == "array":
+        return [_starting_value(part["items"])] * part.get("minItems", 1)
+    if part.get("type") == "string":
+        return ""
+    least, above = part.get("minimum", 0), part.get("exclusiveMinimum", -1)
+    value = max(least, 0) if above < 0 else min(above + 1, part.get("maximum", above + 1))
+    return int(value) if part.get("type") == "integer" else float(value)
 
 
 def plain(value: Any) -> str:
@@ -132,7 +164,13 @@ class _Reader:
         for name in [*properties, *(name for name in {**value, **written} if name not in properties)]:
             below, inner = f"{key}.{name}", properties.get(name, {})
             own, full = written.get(name), value.get(name)
-            if _is_tables(own) or isinstance(own, dict) or (own is None and isinstance(full, dict)):
+            if below in PLACED and not (full is None and "phase" in properties):
+                items = [
+                    {k: v for k, v in item.items() if v not in (None, "")} if isinstance(item, dict) else item
+                    for item in full or ()
+                ]
+                fields.append(Field(below, name, plain(items), "toml", *_split(inner)))
+            elif _is_tables(own) or isinstance(own, dict) or (own is None and isinstance(full, dict)):
                 group = self.group(below, name, inner, own, full, unit)
                 if group.fields or group.groups or isinstance(own, dict):
                     groups.append(group)

@@ -134,6 +134,8 @@ class Pages:
         try:
             base = load_named(name, tables(added))
         except SceneError as fault:
+            if added:  # the form stays, without the table that does not fit
+                return self._form(name, sets, added[:-1], posted, faults, f"{added[-1]}: {fault.sentence}", 422)
             return self._page("fault.html", 422, message=str(fault))
         texts = dict(posted or {})
         fields = {field.key: field for group in form(base, schema()) for field in group.all_fields()}
@@ -191,8 +193,7 @@ class Pages:
         names = self._flights.names()
         summary = self._flights.summary(log.name) if log and log.name in names else None
         others = [name for name in names if summary is None or name != summary.name]
-        query = [("set", c.override) for c in run.changed if c.value != {}]
-        query += [("add", c.key) for c in run.changed if c.value == {}]
+        query = [("add", c.key) if isinstance(c.value, dict) else ("set", c.override) for c in run.changed]
         return self._page(
             "run.html",
             run=run,

@@ -18,7 +18,7 @@ from lapwing.file_schemas.annotations import Schema
 from lapwing.file_schemas.json_schema import scene_schema
 from lapwing.services.common.schemas.run_schema import SHIPPED
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.views.studio.form_fields import Field, form
+from lapwing.views.studio.form_fields import Field, form, starting_values
 
 SPEEDS = ("1", "2", "5", "10", "max")  # selectable values of --speed
 
@@ -52,7 +52,7 @@ def changes(
         posted: posted texts by key.
         added: keys of added tables.
     """
-    result = [Change(key, {}) for key in added]
+    result = tables(added)
     faults: dict[str, str] = {}
     for field in fields:
         text = posted.get(field.key, field.text).strip()
@@ -150,8 +150,8 @@ def toml_text(name: str, changed: Iterable[Change]) -> str:
 
 
 def tables(keys: Iterable[str]) -> list[Change]:
-    """Return the changes that add tables."""
-    return [Change(key, {}) for key in keys]
+    """Return the changes that add tables, with values of their required keys."""
+    return [Change(key, starting_values(schema(), key)) for key in keys]
 
 
 async def posted_form(request: Request) -> tuple[str, dict[str, str], tuple[str, ...]]:

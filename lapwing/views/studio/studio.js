@@ -60,8 +60,10 @@
       document.querySelector("#command").textContent = command;
       document.querySelector("#python").textContent = python;
       const problem = document.querySelector("#problem");
-      problem.hidden = !error;
-      problem.textContent = error;
+      if (error || latest > 1) { // the first preview keeps the fault of the page
+        problem.hidden = !error;
+        problem.textContent = error;
+      }
       for (const field of all("[data-key]", form)) {
         const fault = faults[field.dataset.key] ?? "";
         field.classList.toggle("changed", changed.includes(field.dataset.key));
@@ -90,7 +92,7 @@
         return ["set", `${input.name}=${input.value}`];
       });
       const added = all("input[name=add]", form).map((input) => ["add", input.value]);
-      location.search = new URLSearchParams([...changed, ...added, ["add", target.value]]);
+      location = `?${new URLSearchParams([...changed, ...added, ["add", target.value]])}#${target.value}`;
     });
     document.querySelector("#filter").addEventListener("input", ({ target }) => {
       const words = target.value.toLowerCase().split(/\s+/).filter(Boolean);

@@ -5,9 +5,11 @@ from typing import NamedTuple
 
 from lapwing.kernels import math
 from lapwing.services.autopilot.commander.commander_state import FailsafeTimer, State
+from lapwing.services.autopilot.commander.guidance import TOO_FAR, TOO_HIGH
 from lapwing.services.autopilot.commander.transitions import Context, disarm, enter
 from lapwing.services.common import status_texts
 from lapwing.services.common.autopilot_parameters import DESCEND, HOLD, LAND, RETURN, TERMINATE
+from lapwing.services.common.plans.fence import INSIDE, OUTSIDE
 
 _MODES = {HOLD: "hold", RETURN: "return", LAND: "land", DESCEND: "descend", TERMINATE: "terminate"}
 _SEVERITY = ("hold", "return", "land", "descend")  # a failsafe never replaces a more severe one
@@ -55,8 +57,11 @@ def _offboard_lost(context: Context) -> bool:
     return context.state.mode_name == "offboard" and not context.state.guidance.offboard_available
 
 
-def _outside_fence(context: Context) -> bool:
-    return not context.state.guidance.allows(context.constants, context.view.estimate.position_world)
+def _fence(reason: str, breach: str) -> Failsafe:
+    def is_active(context: Context) -> bool:
+        return context.state.guidance.breach(context.constants, context.view.estimate.position_world) == breach
+
+    return Failsafe(reason, is_active, lambda p: 0.1, "FS_FENCE_ACT")
 
 
 FAILSAFES = (
@@ -70,7 +75,10 @@ FAILSAFES = (
     Failsafe(status_texts.LINK_LOST, _link_lost, lambda p: 0.0, "NAV_DLL_ACT"),
     Failsafe(status_texts.STICKS_LOST, _sticks_lost, lambda p: 0.0, "NAV_RCL_ACT"),
     Failsafe(status_texts.SETPOINTS_LOST, _offboard_lost, lambda p: 0.0, "FS_OFFBOARD_ACT"),
-    Failsafe(status_texts.FENCE_LEFT, _outside_fence, lambda p: 0.1, "FS_FENCE_ACT"),
+    _fence(status_texts.FENCE_LEFT, OUTSIDE),
+    _fence(status_texts.KEEP_OUT_ENTERED, INSIDE),
+    _fence(status_texts.TOO_FAR, TOO_FAR),
+    _fence(status_texts.TOO_HIGH, TOO_HIGH),
 )
 
 

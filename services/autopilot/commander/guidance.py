@@ -36,6 +36,9 @@ class OperatorInputs:
         self.sticks_age += dt
 
 
+TOO_FAR, TOO_HIGH = "too far from home", "too high above home"  # places that the maximum distances forbid
+
+
 @dataclass
 class Guidance:
     """Setpoint, route, fence and operator inputs."""
@@ -101,14 +104,14 @@ class Guidance:
         p = self.parameters
         return p.get("GF_MAX_HOR_DIST", 0.0), p.get("GF_MAX_VER_DIST", 0.0)  # not in logs of former versions
 
-    def allows(self, constants: Constants, position_world: Vec3) -> bool:
-        """Return True if the fence and the maximum distances from home allow a position [m]."""
+    def breach(self, constants: Constants, position_world: Vec3) -> str:
+        """Return the breach of the distances from home or of the fence by a position [m], "" if there is none."""
         (x, y, z), (horizontal, vertical) = position_world, self.home_distances
         if 0.0 < horizontal <= math.dist((x, y), self.home[:2]):
-            return False
+            return TOO_FAR
         if 0.0 < vertical <= z - constants.resting_height - self.home[2]:
-            return False
-        return self.fence.allows(x, y)
+            return TOO_HIGH
+        return self.fence.breach(x, y)
 
     @property
     def first_place_limit(self) -> float:

@@ -5,6 +5,7 @@ from lapwing.services.autopilot.commander.commander_input import CommanderInput
 from lapwing.services.autopilot.commander.commander_state import State
 from lapwing.services.autopilot.estimator import SOURCES
 from lapwing.services.common import status_texts
+from lapwing.services.common.plans.fence import OUTSIDE
 
 NOT_STARTED = 0xFF  # health of the estimate before the filter has started
 MAXIMUM_TILT = 0.35  # [rad] from the vertical
@@ -34,6 +35,6 @@ def arming_blockers(view: CommanderInput, state: State) -> list[str]:
         blockers.append(status_texts.NOT_LEVEL)
     if view.battery_charge < guidance.parameters["BAT_CRIT_THR"]:
         blockers.append(f"{status_texts.BATTERY_LOW}: {view.battery_charge:.0%}")
-    if not guidance.fence.allows(*estimate.position_world[:2]):
-        blockers.append(status_texts.OUTSIDE_FENCE)
+    if breach := guidance.fence.breach(*estimate.position_world[:2]):
+        blockers.append(status_texts.OUTSIDE_FENCE if breach == OUTSIDE else status_texts.IN_KEEP_OUT)
     return blockers

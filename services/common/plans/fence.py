@@ -5,6 +5,7 @@ from typing import Any
 
 from lapwing.kernels import math
 
+OUTSIDE, INSIDE = "outside of the geofence", "in a keep-out area of the geofence"  # places that a fence forbids
 _POLYGONS, _CIRCLES = ("fence_inclusion", "fence_exclusion"), ("fence_circle_in", "fence_circle_out")
 
 
@@ -52,14 +53,18 @@ class Fence:
 
     def allows(self, x: float, y: float) -> bool:
         """Return True if the vehicle may be at world (x, y) [m]."""
+        return not self.breach(x, y)
+
+    def breach(self, x: float, y: float) -> str:
+        """Return OUTSIDE or INSIDE by the first area that forbids world (x, y) [m], "" if the vehicle may be there."""
         for stay_in, shape in self.shapes:
             if isinstance(shape, tuple):
                 within = math.hypot(x - shape[0], y - shape[1]) <= shape[2]
             else:
                 within = _inside(x, y, shape)
             if within != stay_in:
-                return False
-        return True
+                return OUTSIDE if stay_in else INSIDE
+        return ""
 
 
 def rally_points(items: Sequence[Any]) -> tuple[tuple[float, float, float], ...]:

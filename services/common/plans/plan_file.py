@@ -24,7 +24,7 @@ from lapwing.services.common.plans.converter import convert, label, notes, refus
 from lapwing.services.common.plans.fence import Fence
 from lapwing.services.common.plans.plan_item import FENCE, MISSION, RALLY, PlanItem, RefusedItemError
 from lapwing.services.common.plans.qgc_plan import EXPECTED, PlanItems, entry, read_json
-from lapwing.services.common.plans.route_checks import check_first_place, ends_in_the_air, forbidden_by, has_place
+from lapwing.services.common.plans.route_checks import breach_of, check_first_place, ends_in_the_air, has_place
 from lapwing.services.common.schemas.environment_schema import EnvironmentTable, environment
 from lapwing.services.common.schemas.vehicle_schema import start_place
 
@@ -135,12 +135,12 @@ def _end_in_flight(items: Sequence[PlanItem], route: Sequence[Any]) -> Iterator[
 
 def _check_places(fence: Fence, items: Sequence[tuple[PlanItem, Any]], site: Site) -> None:
     """Raise ValueError if the fence forbids the start or a position, or a position is below the ground."""
-    if not fence.allows(*site.start):
-        x, y = site.start
-        raise ValueError(f"geoFence: the vehicle starts outside, at x = {x:g} m, y = {y:g} m; move the fence or home")
+    x, y = site.start
+    if breach := fence.breach(x, y):
+        raise ValueError(f"geoFence: the start at x = {x:g} m, y = {y:g} m is {breach}; move the fence or home")
     for item, converted in items:
-        if forbidden_by(fence, converted):
-            raise ValueError(f"{label(item)}: outside of the geofence; move the item or the fence")
+        if breach := breach_of(fence, converted):
+            raise ValueError(f"{label(item)}: {breach}; move the item or the fence")
         x, y, z = converted.position
         if converted.action not in ("land", "takeoff") and has_place(converted) and z < (height := site.ground(x, y)):
             raise ValueError(f"{label(item)}: {height - z:.3g} m below the ground; raise its altitude")

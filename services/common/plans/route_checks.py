@@ -72,13 +72,14 @@ def has_place(item: Any) -> bool:
     return flown and math.isfinite(item.position.x) and math.isfinite(item.position.y)
 
 
-def forbidden_by(fence: Any, item: Any) -> bool:
-    """Return True if a fence forbids the position of an item, or a part of its circle."""
+def breach_of(fence: Any, item: Any) -> str:
+    """Return the fence's breach by the position of an item, or a part of its circle; "" if it is allowed."""
     if not (has_place(item) or item.action == "rally"):
-        return False
+        return ""
     (x, y, _), radius = item.position, item.radius if item.action == ORBIT else 0.0
     angles = [math.tau * k / CORNERS for k in range(CORNERS if radius else 1)]
-    return not all(fence.allows(x + radius * math.cos(a), y + radius * math.sin(a)) for a in angles)
+    breaches = (fence.breach(x + radius * math.cos(a), y + radius * math.sin(a)) for a in angles)
+    return next(filter(None, breaches), "")
 
 
 def ends_in_the_air(items: Sequence[Any]) -> bool:

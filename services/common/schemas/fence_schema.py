@@ -5,35 +5,38 @@
 corners = [[-5.0, -5.0], [30.0, -5.0], [30.0, 30.0], [-5.0, 30.0]]  # m
 
 [[fence.keep_out]]
-position = [12.0, 4.0]  # m
-radius = 3.0            # m
+position = { latitude_deg = 40.7687, longitude_deg = 14.7909 }  # or [12.0, 4.0], m
+radius = 3.0  # m
 ```
 
-Lapwing's autopilot acts on leaving the fence by its parameter FS_FENCE_ACT, and returns around it.
+Lapwing's autopilot acts on a breach of the fence by its parameter FS_FENCE_ACT, and returns around it.
 """
 
 from typing import Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
-from lapwing.cosim.scene import Scene, SceneTable
+from lapwing.cosim.scene import Files, Scene, SceneTable
+from lapwing.cosim.scene.files import unvalidated_value
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.validation import Table
 from lapwing.messages import OperatorCommand, Vector3
 from lapwing.services.common.firmware.schema import OWN, firmware_of, flown_by_firmware
 from lapwing.services.common.plans.fence import Fence
 from lapwing.services.common.plans.item_converters import new_item
 from lapwing.services.common.schemas.environment_schema import Length, Pair
+from lapwing.services.common.schemas.place_schema import world_place
 from lapwing.services.common.schemas.vehicle_schema import start_place
 
 SOURCE = "scene"
+Corners = Annotated[tuple[Pair, ...], Field(strict=False, min_length=3)]
 
 
-class Area(BaseModel):
+class Area(Table):
     """A polygon or a circle, of any height."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
-    corners: Annotated[tuple[Pair, ...], Field(strict=False, min_length=3)] | None = None  # [m] world x, y of a polygon
-    position: Pair | None = None  # [m] world x and y of the centre of a circle, with radius, instead of corners
+    corners: Corners | None = None  # [m] world x, y of a polygon, or tables: latitude_deg, longitude_deg
+    position: Pair | None = None  # [m] centre of a circle, as a corner, with radius, instead of corners
     radius: Length | None = None  # [m] of the circle
 
     def items(self, polygon: str, circle: str) -> list[Any]:
@@ -55,6 +58,18 @@ class FenceTable(SceneTable):
     keep_in: tuple[Area, ...] = Field(default=(), strict=False)  # areas that a vehicle must stay in, all at once
     keep_out: tuple[Area, ...] = Field(default=(), strict=False)  # areas that a vehicle must keep out of
 
+    @classmethod
+    def embed(cls, tree: dict[str, Any], files: Files) -> None:
+        """Convert latitudes and longitudes to metres."""
+        for kind in ("keep_in", "keep_out"):
+            areas = unvalidated_value(tree, cls.TABLE, kind)
+            for i, area in enumerate(areas if isinstance(areas, list) else ()):
+                key = f"{cls.TABLE}.{kind}.{i}"
+                if isinstance(area, dict) and "position" in area:
+                    area["position"] = world_place(tree, f"{key}.position", area["position"])
+                if isinstance(area, dict) and isinstance(corners := area.get("corners"), list):
+                    area["corners"] = [world_place(tree, f"{key}.corners.{k}", at) for k, at in enumerate(corners)]
+
     def items(self) -> tuple[Any, ...]:
         """Return the items of an upload. Raise ConfigError for an area with neither or both shapes."""
         result = []
@@ -72,8 +87,10 @@ class FenceTable(SceneTable):
     def check(self, scene: Scene) -> None:
         """Raise ConfigError if an area has no shape, a vehicle starts outside, or it flies without a fence."""
         x, y, _ = start_place(scene)
-        if not Fence(self.items()).allows(x, y):
-            raise ConfigError(self.TABLE, f"forbids the start at x = {x:g} m, y = {y:g} m", "a fence around the start")
+        if breach := Fence(self.items()).breach(x, y):
+            raise ConfigError(
+                self.TABLE, f"the start at x = {x:g} m, y = {y:g} m is {breach}", "another fence or start"
+            )
         if flown_by_firmware(scene):
             expected = f'autopilot.firmware = "{OWN}", or a plan with a geofence'
             raise ConfigError(self.TABLE, f"is not uploaded to {firmware_of(scene)}", expected)

@@ -86,6 +86,7 @@ FAILED = {  # event and component by the beginning of the reason
     status_texts.NOT_LEVEL: (_check("check_level", "The vehicle is not level"), "none"),
     status_texts.BATTERY_LOW: (_check("check_battery", "The battery is low"), "battery"),
     status_texts.OUTSIDE_FENCE: (_check("check_fence", "The vehicle is outside the fence"), "none"),
+    status_texts.IN_KEEP_OUT: (_check("check_keep_out", "The vehicle is in a keep-out area"), "none"),
 }
 OTHER = _check("check_other", "The vehicle cannot be armed"), "none"
 _READINGS = {status_texts.NO_READINGS.format(source): source for source in SOURCES}

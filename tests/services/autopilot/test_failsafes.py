@@ -162,10 +162,13 @@ def test_maximum_distances_from_home_are_fence():
     }
     flight = fly(12, UP | places | {(5.2, 12.0): [command("manual", 0.6, 0.0, 0.0, 0.0)]}, *limits)
     assert [results(flight)[k] for k in (1, 2, 3)] == [REJECTED, REJECTED, ACCEPTED]
-    assert "the vehicle has left the fence: hold" in sent_texts(flight)
+    assert "the vehicle is too far from home: hold" in sent_texts(flight)
+    assert "go to: the position is too high above home" in sent_texts(flight)
     assert 5.0 < np.hypot(*place(flight, 12.0)[:2]) < 9.0
     rising = UP | {5.1: [command("position_control")], (5.2, 12.0): [command("manual", 0.0, 0.0, 0.5, 0.0)]}
-    assert 6.35 < height(fly(12, rising, *limits), 12.0) < 8.0
+    flight = fly(12, rising, *limits)
+    assert "the vehicle is too high above home: hold" in sent_texts(flight)
+    assert 6.35 < height(flight, 12.0) < 8.0
 
 
 def test_maximum_height_ends_trajectory_of_scene():

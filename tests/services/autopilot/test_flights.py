@@ -159,7 +159,8 @@ def test_inclusion_and_exclusion_polygons():
     }
     flight = fly(14, script, "autopilot.parameters.FS_FENCE_ACT=1")
     assert [results(flight)[k] for k in (1, 2, 3, 4, 5)] == [ACCEPTED, REJECTED, REJECTED, ACCEPTED, DENIED]
-    assert "the vehicle has left the fence: hold" in sent_texts(flight)
+    assert "the vehicle has entered a keep-out area: hold" in sent_texts(flight)
+    assert "go to: the position is in a keep-out area of the geofence" in sent_texts(flight)
     assert 6.0 < place(flight, 14.0)[0] < 8.0  # it stopped behind the edge of the tower
 
 

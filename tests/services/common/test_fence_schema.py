@@ -5,7 +5,11 @@ import math
 import numpy as np
 import pytest
 
+from lapwing.dynamics.environment import STANDARD
+from lapwing.dynamics.geodesy import enu_to_geodetic
 from lapwing.flights.flight_data import FlightData
+from lapwing.kernels import python_function
+from lapwing.services.common.schemas.fence_schema import FenceTable
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.studies.simulate import fly
 from tests.commands import assert_rejected, run_command
@@ -44,13 +48,31 @@ def test_all_vehicles_of_a_fleet_have_the_fence():
     assert [[command.kind for command in plan] for plan in plans] == [["fence_upload", "finish"]] * len(plans)
 
 
+def test_places_may_be_latitudes_and_longitudes():
+    home = STANDARD.home
+    latitude, longitude, _ = python_function(enu_to_geodetic)(home, (12.0, -7.0, 0.0))
+    place = f"{{latitude_deg = {latitude!r}, longitude_deg = {longitude!r}}}"
+    circle, polygon = f"{{position = {place}, radius = 2.0}}", f"{{corners = [[9, 9], {place}, [9, -9]]}}"
+    fence = load("quad_x", [f"fence.keep_out=[{circle}, {polygon}]"])[FenceTable]
+    places = [fence.keep_out[0].position, fence.keep_out[1].corners[1]]
+    np.testing.assert_allclose(places, [(12.0, -7.0)] * 2, atol=1e-6)
+    assert fence.keep_out[1].corners[0] == (9.0, 9.0)
+
+
 @pytest.mark.parametrize(
     ("override", "message"),
     [
         ("fence.keep_out=[{radius = 3.0}]", "fence.keep_out.0: expected corners, or position and radius, got radius"),
         ("fence.keep_out=[{}]", "fence.keep_out.0: expected corners, or position and radius, got nothing"),
         ("fence.keep_in=[{corners = [[1, 2], [3, 4]]}]", "fence.keep_in.0.corners: expected at least 3 of them"),
-        ("fence.keep_in=[{position = [9, 9], radius = 3.0}]", "fence: forbids the start at x = 0 m, y = 0 m"),
+        (
+            "fence.keep_in=[{position = [9, 9], radius = 3.0}]",
+            "fence: the start at x = 0 m, y = 0 m is outside of the geofence; expected another fence or start",
+        ),
+        (
+            "fence.keep_in=[{position = {latitude_deg = 91, longitude_deg = 0}, radius = 3.0}]",
+            "fence.keep_in.0.position.latitude_deg: expected a number at least -90",
+        ),
         ("fence.keepin=[]", "unknown key 'keepin'; did you mean keep_in?"),
     ],
 )
@@ -66,7 +88,7 @@ def test_firmware_has_its_own_fence():
 def test_vehicle_returns_from_the_fence_and_its_log_repeats(tmp_path):
     words = ("run", "quad_x", "--mode", "single-process", "--log", "fence.mcap")
     done = run_command(*words, "--set", CIRCLE, code=4, folder=tmp_path)
-    assert "the vehicle has left the fence" in done.stdout
+    assert "the vehicle has entered a keep-out area" in done.stdout
     flight = FlightData.read(tmp_path / "fence.mcap")
     assert 1.5 < flight.truth.position[:, 1].max() < 5.0  # of 6 m: it enters the area at y = 1.5 m, and turns back
     assert math.hypot(*flight.truth.position[-1, :2]) < 0.2

@@ -96,7 +96,11 @@ def circle_around(latitude):
         ([SIMPLE | {"type": "Item"}], {}, "item 1: unknown type Item"),
         ([], {}, "contains no mission item; add a take-off"),
         ([FAR], {}, r"item 1, NAV_WAYPOINT: 111\d\d m from the start; expected at most 10000 m"),
-        ([SIMPLE], {"geoFence": circle_around(40.0)}, "geoFence: the vehicle starts outside, at x = 0 m, y = 0 m"),
+        (
+            [SIMPLE],
+            {"geoFence": circle_around(40.0)},
+            "geoFence: the start at x = 0 m, y = 0 m is outside of the geofence",
+        ),
         ([SIMPLE, FAR], {"geoFence": circle_around(40.7686)}, "item 2, NAV_WAYPOINT: outside of the geofence"),
         ([SIMPLE], {"geoFence": {"polygons": [{"inclusion": True, "polygon": []}]}}, "a polygon without corners"),
         ([SIMPLE], {"geoFence": {"polygon": [[0.0, 0.0]] * 2}}, "a polygon of 2 corners"),

@@ -224,7 +224,7 @@ def test_air_mode_fence_and_sticks_act_and_are_saved(station, tmp_path):
     assert station.set("MC_AIRMODE", 2) == 2
     assert station.set("GF_ACTION", 2) == 2
     station.link.mav.param_set_send(1, 1, b"GF_MAX_VER_DIST", 1.0, REAL)
-    station.receive("STATUSTEXT", lambda m: m.text.startswith("the vehicle has left the fence: hold"))
+    station.receive("STATUSTEXT", lambda m: m.text.startswith("the vehicle is too high above home: hold"))
     station.link.mav.manual_control_send(1, 0, 0, 500, 0, 0)  # once: then the sticks are lost
     station.receive("STATUSTEXT", lambda m: m.text.startswith("the sticks are lost: land"))
     armed = mavlink.MAV_MODE_FLAG_SAFETY_ARMED

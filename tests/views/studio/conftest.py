@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 TIMEOUT = 300.0  # [s] generous, for a loaded machine
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 
 
 class NoRedirect(urllib.request.HTTPRedirectHandler):

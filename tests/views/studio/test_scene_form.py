@@ -9,7 +9,7 @@ from lapwing.cosim.scene.toml_text import toml
 from lapwing.file_schemas.json_schema import scene_schema
 from lapwing.services.common.schemas.run_schema import SHIPPED
 from lapwing.services.scene_resolver import load
-from lapwing.views.studio.form_fields import additions, form
+from lapwing.views.studio.form_fields import additions, form, starting_values
 from lapwing.views.studio.scene_forms import Change, changes, command_line, python
 
 
@@ -75,6 +75,25 @@ def test_tables_that_scene_lacks_can_be_added(schema):
     added = load("hover", {"effects.random_wind_force": {}})
     by_key = {field.key for group in form(added, schema) for field in group.all_fields()}
     assert "effects.random_wind_force.mean" in by_key
+
+
+def test_added_tables_have_all_required_values(schema):
+    def fault(key):
+        try:
+            load("hover", {key: starting_values(schema, key)})
+        except SceneError as error:
+            return f"{key}: {error}"
+        return ""
+
+    assert not [text for key, _ in additions(load("hover"), schema) if "missing" in (text := fault(key))]
+
+
+def test_places_are_lists_in_metres(schema):
+    place = {"latitude_deg": 40.7686, "longitude_deg": 14.7907}
+    scene = load("hover", {"fence.keep_out": [{"position": place, "radius": 2.0}], "vehicle.initial_position": (5, 5)})
+    texts = {field.key: field.text for group in form(scene, schema) for field in group.all_fields()}
+    assert texts["fence.keep_out"] == "[{position = [0.0, 0.0], radius = 2.0}]"
+    assert texts["fence.keep_in"] == texts["environment.terrain.box"] == "[]"
 
 
 def test_unchanged_texts_add_no_overrides(schema):

@@ -170,42 +170,102 @@ velocity = [2.0, 0.0, 0.0]
 """
 
 
+class Mouse:
+    """Real mouse of a browser, on the centres of elements."""
+
+    def __init__(self, browser):
+        self._browser, self._user = browser, User(browser)
+
+    def _send(self, kind, place, pressed, count=1, shift=False):
+        x, y = place
+        options = {"button": "left", "buttons": int(pressed), "clickCount": count, "modifiers": 8 * shift}
+        self._browser.call("Input.dispatchMouseEvent", type=kind, x=x, y=y, **options)
+
+    def place_of(self, selector):
+        return self._user.do(
+            f"const box = (await until(() => one({selector!r}))).getBoundingClientRect();"
+            "return [box.x + box.width / 2, box.y + box.height / 2];"
+        )
+
+    def click(self, selector, dx=0.0, dy=0.0, count=1):
+        x, y = self.place_of(selector)
+        for number in range(1, count + 1):
+            self._send("mousePressed", (x + dx, y + dy), True, number)
+            self._send("mouseReleased", (x + dx, y + dy), False, number)
+
+    def drag(self, selector, dx, dy, shift=False):
+        x, y = self.place_of(selector)
+        self._send("mousePressed", (x, y), True, 1, shift)
+        for share in (0.5, 1.0):
+            self._send("mouseMoved", (x + share * dx, y + share * dy), True, 0, shift)
+        self._send("mouseReleased", (x + dx, y + dy), False, 1, shift)
+
+
+def changed_tables(user, number, part):
+    """Return the changes as tables, as soon as so many fields have changed without a fault, and `part` with them."""
+    text = user.do(
+        f"""
+        await until(() => document.querySelectorAll(".field.changed").length === {number} && one("#problem").hidden);
+        await until(() => one("#toml").textContent.includes({part!r}));
+        return one("#toml").textContent;
+        """
+    )
+    return tomllib.loads(text)
+
+
 def test_user_drags_waypoint_building_start_and_wind(start, tmp_path):
     write_scene("mine", tmp_path)
     scene = tmp_path / "mine.toml"
     scene.write_text(scene.read_text() + PLACES)
     studio = start(tmp_path)
     with chromium.Browser(f"{studio.address}scenes/mine.toml", (1280, 900)) as browser:
-        user = User(browser)
-        changed = user.do(
-            """
-            const move = (what, dx, dy, more) => {
-              const box = one(what).getBoundingClientRect(), [x, y] = [box.x + box.width / 2, box.y + box.height / 2];
-              const send = (to, kind, x, y) => to.dispatchEvent(
-                new PointerEvent(kind, { clientX: x, clientY: y, pointerId: 1, bubbles: true, ...more }));
-              one("#map").setPointerCapture = () => {};
-              send(one(what), "pointerdown", x, y);
-              send(one("#map"), "pointermove", x + dx, y + dy);
-              send(one("#map"), "pointerup", x + dx, y + dy);
-            };
-            await until(() => one("#map .waypoint"));
-            move("#map .waypoint", 0, -30, { shiftKey: true });
-            for (const what of [".building", ".start", "circle.wind"]) move(`#map ${what}`, 25, 0, {});
-            await until(() => document.querySelectorAll(".field.changed").length === 4);
-            return [one("#toml").textContent, one("#command").textContent, one("#problem").hidden];
-            """
-        )
+        user, mouse = User(browser), Mouse(browser)
+        mouse.drag("#map .waypoint", 0, -30, shift=True)
+        for what in (".building", ".start", "circle.wind"):
+            mouse.drag(f"#map {what}", 25, 0)
+        tables = changed_tables(user, 4, "wind_constant")
+        assert "--set 'trajectory.waypoints=" in user.do("return one('#command').textContent")
         assert browser.errors == []
-    text, command, valid = changed
-    assert valid
-    tables, before = tomllib.loads(text), tomllib.loads(scene.read_text())
+    before = tomllib.loads(scene.read_text())
     first, *others = tables["trajectory"]["waypoints"]
     assert first[:2] == before["trajectory"]["waypoints"][0][:2]
     assert first[2] > before["trajectory"]["waypoints"][0][2]
     assert others == before["trajectory"]["waypoints"][1:]
     (box,) = tables["environment"]["terrain"]["box"]
-    assert {**box, "position": [4.0, 4.0]} == before["environment"]["terrain"]["box"][0]
+    assert {**box, "position": [4.0, 4.0]} == {**before["environment"]["terrain"]["box"][0], "heading": 0.0}
     assert box["position"][0] > 4.0
     assert tables["vehicle"]["initial_position"][0] > 0.0
     assert tables["effects"]["wind_constant"]["velocity"][1] > 0.0
-    assert "--set 'trajectory.waypoints=" in command
+
+
+def test_user_places_and_removes_fences_buildings_and_waypoints(start, tmp_path):
+    write_scene("mine", tmp_path)
+    studio = start(tmp_path)
+    with chromium.Browser(f"{studio.address}scenes/mine.toml", (1280, 900)) as browser:
+        user, mouse = User(browser), Mouse(browser)
+        for tool, dx, dy in (("in", 0, 30), ("out", 40, -40), ("tower", -120, 10)):
+            mouse.click(f"[data-tool={tool}]")
+            mouse.click("#map", dx, dy)
+        before = changed_tables(user, 3, "cylinder")
+        assert len(before["fence"]["keep_in"][0]["corners"]) == 4
+        mouse.drag("#map circle.fence.out:not(.edge)", 20, 0)
+        mouse.drag("#map circle.edge.fence.out", 20, 0)
+        mouse.drag("#map circle.between.fence.in", 0, 10)
+        mouse.click("#map circle.building", count=2)
+        mouse.click("#map circle.waypoint", count=2)
+        after = changed_tables(user, 3, "waypoints")
+        assert browser.errors == []
+    (old,), (new,) = before["fence"]["keep_out"], after["fence"]["keep_out"]
+    assert (new["position"] != old["position"], new["radius"] > old["radius"]) == (True, True)
+    assert len(after["fence"]["keep_in"][0]["corners"]) == 5
+    assert "environment" not in after
+    assert after["trajectory"]["waypoints"] == [[6.0, 0.0, 3.0], [6.0, 4.0, 4.0]]
+
+
+def test_added_wind_has_values_and_a_table_that_does_not_fit_keeps_the_form(start, tmp_path):
+    studio = start(tmp_path)
+    page = studio.page("scenes/hover?add=effects.wind_constant")
+    assert 'name="effects.wind_constant.velocity" value="[0.0, 0.0, 0.0]"' in page
+    status, page, _ = studio.request("scenes/hover?add=effects.wind_constant&add=effects.gravity_altitude")
+    assert (status, 'name="effects.wind_constant.velocity"' in page) == (422, True)
+    assert "effects.gravity_altitude: cannot be combined with effects.gravity" in page

@@ -19,8 +19,8 @@ class Mode(FlightMode):
         self._target = fill_in(guidance.smoothing.position, vector(values, 0))
         if not all(map(math.isfinite, self._target)) or self._target[2] <= constants.resting_height:
             raise ValueError("go to: expected a position above the ground")
-        if not guidance.allows(constants, self._target):
-            raise ValueError("go to: the position is outside of the fence")
+        if breach := guidance.breach(constants, self._target):
+            raise ValueError(f"go to: the position is {breach}")
         self._leg = Leg(guidance.smoothing.position, self._target)
         self._phase = f"go to {guidance.words(constants, self._target)}"
         self._yaw, speed = value(values, 3), value(values, 4)

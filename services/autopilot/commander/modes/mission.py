@@ -12,7 +12,7 @@ from lapwing.services.autopilot.commander.modes import land, orbit, return_, tak
 from lapwing.services.autopilot.commander.route import GRAB
 from lapwing.services.autopilot.commander.smoothing import wrap_angle
 from lapwing.services.common import status_texts
-from lapwing.services.common.plans.route_checks import ORBIT, TO_PLACES, forbidden_by, is_instant
+from lapwing.services.common.plans.route_checks import ORBIT, TO_PLACES, breach_of, is_instant
 
 NAME = "mission"
 ARRIVED = 0.05  # [m]
@@ -32,8 +32,8 @@ class Mode(FlightMode):
         if not route.items:
             raise ValueError("mission: no mission is uploaded; upload one first")
         for number, item in enumerate(route.items, start=1):
-            if forbidden_by(guidance.fence, item):
-                raise ValueError(f"mission: item {number} is outside of the geofence; move the item or the fence")
+            if breach := breach_of(guidance.fence, item):
+                raise ValueError(f"mission: item {number} is {breach}; move the item or the fence")
         first = value(values, 0)
         if math.isfinite(first) and first >= 0.0:
             route.select(int(first))

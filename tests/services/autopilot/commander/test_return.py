@@ -9,7 +9,7 @@ from flights import command, item
 
 from lapwing.services.autopilot.commander.geofence_routing import route_around
 from lapwing.services.common.plans.fence import Fence
-from lapwing.services.common.plans.route_checks import forbidden_by
+from lapwing.services.common.plans.route_checks import breach_of
 
 BOX = [(10.0, -15.0), (20.0, -15.0), (20.0, 10.0), (10.0, 10.0)]
 
@@ -90,5 +90,5 @@ def test_return_waits_at_configured_height():
 
 def test_circle_that_leaves_the_fence_is_refused():
     fence = Fence([item("fence_circle_in", 0.0, 0.0, 0.0, radius=12.0)])
-    assert forbidden_by(fence, item("orbit", 8.0, 0.0, 6.0, radius=5.0, values=(6.0, 2.0, math.nan)))
-    assert not forbidden_by(fence, item("orbit", 6.0, 0.0, 6.0, radius=5.0, values=(6.0, 2.0, math.nan)))
+    assert breach_of(fence, item("orbit", 8.0, 0.0, 6.0, radius=5.0, values=(6.0, 2.0, math.nan)))
+    assert not breach_of(fence, item("orbit", 6.0, 0.0, 6.0, radius=5.0, values=(6.0, 2.0, math.nan)))
