@@ -10,15 +10,21 @@ unexport PYTHONDONTWRITEBYTECODE
 
 # The lock file pins tested versions by hash. pip accepts no hashes for a folder, so the project itself is installed
 # with the same versions as constraints. Byte code is compiled on import: most modules are never imported.
+# `make mission` compiles kernels while the packages that this does not need are installed.
 INSTALL := $(BIN)/python -m pip install --disable-pip-version-check --no-compile
 PINNED := $(INSTALL) --constraint $(VENV)/versions.txt --editable
 LOCKS := deploy/requirements.lock deploy/requirements-all.lock
+LATE := contourpy|eclipse-zenoh|fonttools|kiwisolver|matplotlib|pillow|plotly
+PRECOMPILE := $(if $(filter mission,$(or $(MAKECMDGOALS),mission)),$(BIN)/lapwing precompile;)
 $(VENV)/.mission: pyproject.toml $(LOCKS)
 	test -x $(BIN)/python || $(PYTHON) -m venv $(VENV)
 	@echo "installing the pinned packages into $(VENV) (once)"
-	$(INSTALL) --require-hashes --requirement deploy/requirements.lock
 	sed -n 's/^\([^ ]*==[^ ]*\).*/\1/p' $(LOCKS) > $(VENV)/versions.txt
-	$(PINNED) ".[report]" --no-build-isolation  # setuptools is locked
+	awk '/^[^ ]/ {early = !/^($(LATE))==/} early' deploy/requirements.lock > $(VENV)/early.lock
+	$(INSTALL) --require-hashes --requirement $(VENV)/early.lock
+	$(INSTALL) --no-deps --no-build-isolation --editable .  # setuptools is locked
+	$(INSTALL) --quiet --require-hashes --requirement deploy/requirements.lock & \
+		$(PRECOMPILE) wait $$!
 	touch $@
 
 $(VENV)/.installed: $(VENV)/.mission

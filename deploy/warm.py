@@ -23,6 +23,7 @@ def note(event: str, arguments: tuple[Any, ...]) -> None:
 
 
 sys.addaudithook(note)
+os.sched_setaffinity(0, {min(os.sched_getaffinity(0))})  # workers would open kernels unnoticed
 sys.argv = ["lapwing", "precompile"]
 try:
     main()

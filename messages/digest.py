@@ -28,7 +28,7 @@ class Digest:
         if len(parts) >= _FOLD:
             self._fold(topic)
 
-    def update_page(self, topic: str, times_ns: np.ndarray, payloads: np.ndarray) -> None:
+    def update_batch(self, topic: str, times_ns: np.ndarray, payloads: np.ndarray) -> None:
         """Add n messages of a topic that have the same size, as n calls of `update` do.
 
         Args:

@@ -10,7 +10,7 @@ from lapwing.messages.cdr_layout import ENCAPSULATION, Layout
 
 Column = np.ndarray | list[Any]
 
-PAGE = 4096  # [messages] that are converted together
+BATCH = 4096  # [messages] that are converted together
 
 
 class _Group(NamedTuple):
@@ -33,7 +33,7 @@ class TopicColumns(Mapping[str, Column]):
     """
 
     def __init__(self, message: Any, groups: Sequence[_Group]) -> None:
-        """Store messages of a class, grouped by shape; see `history` and `history_of_pages`."""
+        """Store messages of a class, grouped by shape; see `history` and `history_of_batches`."""
         self.message = message
         self.count = sum(len(group.indices) for group in groups)
         self._groups = groups
@@ -110,7 +110,7 @@ def history(message: Any, payloads: Sequence[bytes]) -> TopicColumns:
 
 
 class ColumnBuilder:
-    """Builder of columns from single messages, page by page, so that at most one page is in memory twice."""
+    """Builder of columns from single messages, batch by batch, so that at most one batch is in memory twice."""
 
     def __init__(self, message: Any) -> None:
         self._message, self._groups = message, list[_Group]()
@@ -119,18 +119,18 @@ class ColumnBuilder:
         self._count = 0
 
     def add(self, time_ns: int, payload: bytes) -> None:
-        """Add an encoded message. Raise ValueError if a message of its page is not one of the class."""
+        """Add an encoded message. Raise ValueError if a message of its batch is not one of the class."""
         self._pending.append((time_ns, payload))
-        if len(self._pending) == PAGE:
-            self._convert_page()
+        if len(self._pending) == BATCH:
+            self._convert_batch()
 
     def history(self) -> tuple[np.ndarray, TopicColumns]:
         """Return times [ns], int64, shape (n,), and columns of all messages. See `history`."""
         if self._pending or not self._groups:
-            self._convert_page()
+            self._convert_batch()
         return np.concatenate(self._times), TopicColumns(self._message, self._groups)
 
-    def _convert_page(self) -> None:
+    def _convert_batch(self) -> None:
         times, payloads = zip(*self._pending, strict=True) if self._pending else ((), ())
         self._times.append(np.array(times, np.int64))
         self._groups += [
@@ -140,15 +140,15 @@ class ColumnBuilder:
         self._pending.clear()
 
 
-def history_of_pages(message: Any, pages: Sequence[tuple[np.ndarray, np.ndarray]]) -> TopicColumns:
+def history_of_batches(message: Any, batches: Sequence[tuple[np.ndarray, np.ndarray]]) -> TopicColumns:
     """Return messages as columns from record batches of one shape each.
 
     Args:
         message: the message class.
-        pages: indices of the messages among all, shape (m,); their payloads, records or uint8 of shape (m, size).
+        batches: indices of the messages among all, shape (m,); their payloads, records or uint8 of shape (m, size).
     """
     groups = []
-    for indices, payloads in pages:
+    for indices, payloads in batches:
         rows = payloads if payloads.dtype == np.uint8 else _bytes(payloads)
         layout = message.layouts.measure(rows[0].tobytes())
         groups.append(_Group(indices, layout, rows.view(record_dtype(layout)).reshape(len(rows))))

@@ -84,12 +84,12 @@ class Flight(FlightData):
         for name in self.topics:
             topic = topic_of(name)
             messages += [(topic, time // config.interval_ns, payload) for time, payload in self.topic(name).payloads()]
-        pages = to_record_batches(messages)
-        last = max((int(np.max(page.ticks)) for page in pages), default=0)
+        batches = to_record_batches(messages)
+        last = max((int(np.max(batch.ticks)) for batch in batches), default=0)
         log_metadata = metadata(config, "memory") | (failure(self.failure, self.diverged) if self.failure else {})
         with LogWriter(target, log_metadata, attachments(config, {})) as writer:
             recording = Recording(writer, config)
-            recording.write(pages, last)
+            recording.write(batches, last)
             recording.finish()
             for time_ns, payload in [] if self.has("events") else event_messages(self.events):
                 writer.write(EVENTS.key(self.vehicle), EVENTS.message, payload, time_ns, deterministic=False)

@@ -71,8 +71,8 @@ def warn_of_split_steps(scene: "Scene") -> None:
         model = models.get(vehicle[Vehicle].model)
         if not hasattr(model, "describe"):
             continue
-        form, p = model.describe(vehicle)
-        fastest, step = causes(p, form.initial_state(p).memory)[0], method(vehicle)[2]
+        formulation, p = model.describe(vehicle)
+        fastest, step = causes(p, formulation.initial_state(p).memory)[0], method(vehicle)[2]
         if (number := fastest.rate * step / FASTEST_RATE) > MANY_PARTS:
             message = f"{fastest.name} (decay within {1e3 / fastest.rate:.2g} ms) split each step of {1e3 * step:g} ms"
             typer.echo(f"lapwing: warning: solver: {message} into {number:.0f}, which costs most of the time", err=True)

@@ -152,12 +152,13 @@ def precompile(
         typer.Argument(metavar="[SCENE|FOLDER]...", help="scenes, or folders of scenes [delivery_mission]"),
     ] = None,
 ) -> None:
-    """Compile the kernels of scenes ahead of their first run.
+    """Compile the kernels of scenes ahead of their first run, on all cores.
 
     Invalid scenes are reported and skipped.
     """
     from lapwing.runs.precompile import compile_ahead
     from lapwing.services.scene_resolver import resolve
+    from lapwing.studies.workers import cores, processes, run_here
     from lapwing.views.terminal import console
 
     paths = [each for items in scenes or [Path("delivery_mission")] for each in scenes_of(items)]
@@ -168,7 +169,7 @@ def precompile(
             sound[str(path)] = resolve(with_solver_selected(path, []))
         except ValueError as fault:
             faults.append(fault)
-    compile_ahead(sound, console())
+    compile_ahead(sound, console(), processes(cores()) if cores() > 1 else run_here)
     for other in faults[:-1]:
         typer.echo(f"lapwing: {other}", err=True)
     if faults:

@@ -23,9 +23,9 @@ from lapwing.dynamics.effects._stiff_effects import have_memory_rate
 from lapwing.dynamics.effects._types import AnyMassProperties, PerRotor
 from lapwing.dynamics.vehicles import multirotor_stepper, step_bound
 from lapwing.dynamics.vehicles.multirotor_equations import (
-    MultirotorDrive,
     MultirotorParameters,
     MultirotorState,
+    StepInputs,
     motion_of,
 )
 from lapwing.kernels import always_inline, kernel, math, vectorise_loops
@@ -187,17 +187,17 @@ def _command(commands, member, i):
 def _begin(like, memory, at, key, tick, commands, member, interval):
     m = take(like, memory, at)
     voltages = map_index(_command, m.voltage, commands, member)
-    drive = multirotor_stepper.begin(m.parameters, key, tick, MultirotorState(m.motion, m.memory), voltages, interval)
-    give((m.motion, drive.memory, drive.body, drive.voltage, tick * interval), memory, at)
+    u = multirotor_stepper.begin(m.parameters, key, tick, MultirotorState(m.motion, m.memory), voltages, interval)
+    give((m.motion, u.memory, u.body, u.voltage, tick * interval), memory, at)
 
 
 @always_inline
 def _is_awake(like, memory, at, i, h):
     """Return True if a sleeping effect can reach a member in step i, or the member needs error control."""
     m = take(like, memory, at)
-    drive = MultirotorDrive(m.parameters, m.body, m.memory, m.voltage)
+    u = StepInputs(m.parameters, m.body, m.memory, m.voltage)
     asleep = hooks.all_sleeping(m.parameters.effects, m.memory, motion_of(m.parameters.layout, m.motion), h)
-    return multirotor_stepper.switches(drive, m.start + i * h, m.motion, h) or not asleep
+    return multirotor_stepper.switches(u, m.start + i * h, m.motion, h) or not asleep
 
 
 @generic(inline=True)
@@ -209,8 +209,8 @@ def _integrated(effects: types.Type, changed: types.Type) -> Callable:
 @always_inline
 def _airborne_step(method, like, memory, at, i, h):
     m = take(like, memory, at)
-    drive = MultirotorDrive(m.parameters, m.body, m.memory, m.voltage)
-    changed = multirotor_stepper.airborne_step(method, drive, m.start + i * h, m.motion, h)
+    u = StepInputs(m.parameters, m.body, m.memory, m.voltage)
+    changed = multirotor_stepper.airborne_step(method, u, m.start + i * h, m.motion, h)
     give(_integrated(m.parameters.effects, changed), memory, at)
 
 
@@ -218,8 +218,8 @@ def _airborne_step(method, like, memory, at, i, h):
 def _finish(method, like, memory, at, interval, h, first, n):
     """Integrate the rest of a communication step of one member alone."""
     m = take(like, memory, at)
-    drive = MultirotorDrive(m.parameters, m.body, m.memory, m.voltage)
-    give(multirotor_stepper.steps(method, drive, m.motion, m.start, m.start + interval, h, first, n), memory, at)
+    u = StepInputs(m.parameters, m.body, m.memory, m.voltage)
+    give(multirotor_stepper.steps(method, u, m.motion, m.start, m.start + interval, h, first, n), memory, at)
 
 
 @intrinsic

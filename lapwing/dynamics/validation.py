@@ -1,11 +1,11 @@
-"""Conversion of pydantic's validation errors into `ConfigError`."""
+"""Base class of the tables of TOML files, and conversion of pydantic's validation errors into `ConfigError`."""
 
 import types
 from collections.abc import Callable, Mapping, Sequence
 from typing import Annotated, Any, Literal, TypeVar, Union, get_args, get_origin, get_type_hints
 
 from annotated_types import Ge, Gt, Le, Lt
-from pydantic import BaseModel, ValidationError
+from pydantic import BaseModel, ConfigDict, ValidationError
 from pydantic.fields import FieldInfo
 
 from lapwing.dynamics import units
@@ -19,6 +19,15 @@ UNKNOWN_KEY = ("extra_forbidden", "unexpected_keyword_argument")
 OF_NUMBERS = ("float_type", "int_type", "int_from_float", "float_parsing", "int_parsing", *(
     "greater_than", "greater_than_equal", "less_than", "less_than_equal"))  # fmt: skip
 LONGEST = 60  # shown characters of an invalid value
+
+
+class Table(BaseModel):
+    """Table of a TOML file: no unknown keys, finite numbers, and TOML's types (a text is no number, `true` is not 1).
+
+    The comment behind a field has its unit and description (`lapwing.dynamics.field_comments`).
+    """
+
+    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
 def validated(validate: Callable[[Any], T], table: Any, model: type) -> T:

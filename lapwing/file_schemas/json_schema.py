@@ -213,7 +213,7 @@ def _parameters() -> Schema:
 
 
 def _parameter(p: Parameter) -> Schema:
-    kind = "integer" if p.whole else "number"
+    kind = "integer" if p.integer else "number"
     unit = f"[{p.unit}] " if p.unit else ""
     return {"type": kind, "minimum": p.least, "maximum": p.most, "default": p.default, "description": unit + p.meaning}
 

@@ -9,7 +9,7 @@ import numpy as np
 from lapwing.cosim.diagram.block_diagram import BlockDiagram
 from lapwing.cosim.diagram.topic_encoder import TopicEncoder, encode
 from lapwing.kernels.row_packing import columns
-from lapwing.messages.topic_columns import TopicColumns, history, history_of_pages
+from lapwing.messages.topic_columns import TopicColumns, history, history_of_batches
 from lapwing.messages.topics import Topic, template_topic
 
 
@@ -66,9 +66,9 @@ class PortColumns(Mapping[str, Any]):
     def messages(self) -> TopicColumns:
         """Encoded messages."""
         port = self._diagram.ports[self._encoder.port]
-        pages = list(encode(self._encoder, port, self._diagram.config, self.ticks, self._rows))
-        parts = [(np.searchsorted(self.ticks, page.ticks), page.payloads) for page in pages]
-        return history_of_pages(self._encoder.topic.message, parts)
+        batches = list(encode(self._encoder, port, self._diagram.config, self.ticks, self._rows))
+        parts = [(np.searchsorted(self.ticks, batch.ticks), batch.payloads) for batch in batches]
+        return history_of_batches(self._encoder.topic.message, parts)
 
     def payloads(self) -> list[bytes]:
         """Return the CDR of the messages in order."""

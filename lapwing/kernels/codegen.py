@@ -14,7 +14,7 @@ from numba.core import types
 from numba.core.targetconfig import ConfigStack
 from numba.core.typing.templates import AbstractTemplate, infer_global
 
-from lapwing.kernels import generated
+from lapwing.kernels import DispatchTable, generated
 
 GENERATORS: dict[Callable, Callable[..., Any]] = {}
 """Functions with a separate implementation in compiled code, and its generator from the numba types of arguments."""
@@ -54,6 +54,23 @@ def generic(*, inline: bool = False) -> Callable[[Callable[..., Callable]], Call
         return function
 
     return decorate
+
+
+def dispatch(table: DispatchTable, argument: int = 0, field: str = "") -> Callable[..., Any]:
+    """Return a function for kernels that calls the implementation for the class of one of its arguments.
+
+    Args:
+        table: implementations by class.
+        argument: index of the argument.
+        field: field of the implementation to call, if it has several functions.
+    """
+
+    @generic(inline=True)
+    def call(*arguments: Any) -> Any:
+        found = table[arguments[argument].instance_class]
+        return getattr(found, field) if field else found
+
+    return call
 
 
 def overload_for(function: Callable, *, inline: bool = False) -> Callable[[Callable[..., Callable]], Callable]:

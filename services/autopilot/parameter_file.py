@@ -52,6 +52,6 @@ def write(path: Path, table: Iterable[Parameter], values: Mapping[str, float]) -
     """Write `values` of the parameters in `table`. Raise ValueError (one line) if the file cannot be written."""
     rows = []
     for p in sorted(table, key=lambda p: p.name):
-        value, kind = (f"{values[p.name]:.0f}", _INT32) if p.whole else (repr(values[p.name]), _REAL32)
+        value, kind = (f"{values[p.name]:.0f}", _INT32) if p.integer else (repr(values[p.name]), _REAL32)
         rows.append(f"1\t1\t{p.name}\t{value}\t{kind}")
     write_text(path, "\n".join([*_HEADER, *rows, ""]))

@@ -2,11 +2,12 @@
 
 from typing import Any, ClassVar, Literal
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from lapwing.cosim.scene import Files, Scene
 from lapwing.cosim.scene.files import merge_tables, unvalidated_value
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.validation import Table
 from lapwing.kernels import math
 from lapwing.services.autopilot.controller_parameters import Airframe, build, hover_thrust, hover_torque
 from lapwing.services.autopilot.gains import FOLDER, GainSet
@@ -35,14 +36,13 @@ def distance_sensor(scene: Scene) -> str | None:
     return ports.RANGEFINDER if points_down else None
 
 
-class LandingTable(BaseModel):
+class LandingTable(Table):
     """Thresholds for stopping the motors (theory, section 4.5).
 
     With `cut_height` they stop at once below that height, as in the paper. Otherwise they stop after contact with the
     ground: on the way down, with a low thrust, at rest vertically, and held up by more than the rotors, for a time.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
     cut_height: float = Field(default=0.0, ge=0.0, le=1.0)  # [m] above the resting height; 0: contact is detected
     thrust: float = Field(default=0.75, gt=0.0, lt=1.0)  # of the hover thrust, above which there is no contact
     ground_force: float = Field(default=0.25, gt=0.0, lt=1.0)  # of the weight, the least force of the ground

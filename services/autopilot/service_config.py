@@ -32,10 +32,10 @@ class AutopilotConfig(NamedTuple):
     parameters: tuple[Parameter, ...]
     phases: tuple[str, ...]  # phases of the scene's trajectory; empty without one
     operator: bool  # commands are accepted
-    plan: tuple[Any, ...]  # operator commands at the first tick
     estimate_every: int  # [ticks] between two messages of the estimate
     status_every: int
     answers_every: int
+    plan: tuple[Any, ...] = ()  # operator commands at the first tick
     controller: CustomCode | None = None  # None: the cascaded PID
     own_estimator: CustomCode | None = None
     vehicle: VehicleModel | None = None  # vehicle parameters for user code

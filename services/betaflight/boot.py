@@ -19,7 +19,7 @@ POLL_EVERY = 50  # packets at rest between two requests of the status
 IGNORED = ("arm switch", "not disarmed")  # reasons that disappear when the arm switch opens
 PROMPT = "# "  # end of the command line's output
 NOT_READY = ("starting",)  # reasons of a firmware that got RC channels too early, and ignores them from then on
-RC_TIMEOUT = 15.0  # [s] from the start; the firmware is ready after 5 s
+RC_TIMEOUT = 15.0  # [s] from the start, also of the command line; the firmware is ready after 5 s
 REPEAT = 2.0  # [s] without an answer after which the command line is requested again
 SAVE_TIMEOUT = 30.0  # [s] from `save` to the exit of the program
 
@@ -57,7 +57,6 @@ def settle(
     program: Program | None,
     feed: Callable[[bool], None],
     waits: Waits,
-    can_restart: bool = False,
 ) -> FirmwareStatus:
     """Send the state of a vehicle at rest to the firmware until it can be armed.
 
@@ -67,10 +66,9 @@ def settle(
         program: the program, if Lapwing runs it.
         feed: sends the state, and RC channels if its argument is True; waits a time step.
         waits: see `FirmwareLink`.
-        can_restart: the program can be started again.
 
     Raises:
-        IncompleteStart: it does not receive RC channels, and `can_restart` is True.
+        IncompleteStart: the program, if Lapwing runs it, does not receive RC channels.
         FirmwareError: it cannot be armed within `start_timeout`; the text has its reasons.
     """
     patience = Patience(config.start_timeout, program.pid if program else None, pauses=True)
@@ -91,7 +89,7 @@ def settle(
                 status = msp.parse_status(payload)
         if status and not set(status.blockers).difference(IGNORED):
             return status
-        if can_restart and rc_patience.over and (status is None or status.blockers == NOT_READY):
+        if program and rc_patience.over and (status is None or status.blockers == NOT_READY):
             raise IncompleteStart(f"betaflight: does not {'receive RC channels' if status else 'answer by MSP'}")
     reasons = ", ".join(status.blockers) if status else "no answer by MSP"
     message = f"betaflight: cannot be armed after {config.start_timeout:g} s ({reasons})"
@@ -102,6 +100,7 @@ def configure(config: FirmwareConfig, program: Program, waits: Waits) -> None:
     """Write the configuration through the command line; `save` ends the program.
 
     Raises:
+        IncompleteStart: its command line does not answer.
         FirmwareError: the program rejects a line of the configuration.
     """
     link = connect(config, program, waits)
@@ -127,13 +126,13 @@ def configure(config: FirmwareConfig, program: Program, waits: Waits) -> None:
 def _command(link: Msp, line: str, program: Program, waits: Waits) -> str:
     """Send a line and return the answer up to the next prompt."""
     link.send(line.encode())
-    answer, patience = "", Patience(SAVE_TIMEOUT, program.pid, pauses=True)
+    answer, patience = "", Patience(RC_TIMEOUT, program.pid, pauses=True)
     sent = time.monotonic()
     while not answer.endswith(PROMPT):
         waits("Betaflight's command line")
         program.check(" at its configuration")
         if patience.over:
-            raise FirmwareError(f"betaflight: no answer to {line!r} of its command line within {SAVE_TIMEOUT:g} s")
+            raise IncompleteStart(f"betaflight: no answer to {line!r} of its command line within {RC_TIMEOUT:g} s")
         time.sleep(0.005)
         answer += link.text()
         if line == "#" and not answer and time.monotonic() - sent > REPEAT:  # a firmware that starts may lose it

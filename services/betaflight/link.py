@@ -9,6 +9,7 @@ carry the same time.
 
 import socket
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from functools import partial
 
@@ -27,7 +28,7 @@ from lapwing.services.common.firmware.service import firmware_service
 
 TIME = 1.0  # [s] in all packets
 RC_EVERY = 0.01  # [s]
-STARTS = 3  # starts of the program while it does not receive RC channels
+STARTS = 3  # most starts of a program of which a part does not start
 STATUS_EVERY = 0.2  # [s]
 FEED_EVERY = 0.004  # [s] between two packets at rest in real time
 RUNNING = 0.02  # motor output above which the vehicle is armed
@@ -73,22 +74,40 @@ class BetaflightLink(ProgramLink):
 
     def _begin(self) -> None:
         """Start the firmware or wait for it, and calibrate it."""
+        ports, turns = self._ports, None
         if self._config.command:
             self._start()
+            self._complete(self._configure)
             assert self._program is not None
-            boot.configure(self._config, self._program, self._waits)
-            ports = self._ports
-            step = self._config.interval_ns
             turns = Turns(
-                "b", ports.state, step, (ports.msp, ports.motors), IDLE, ports.motors, start_ns=BOOT, read_ns=READING
-            )
-            self._turns = partial(self._prepare, turns)
-            self._program.restart(self._turns())
-        self._calibrate()
+                "b", ports.state, self._config.interval_ns, (ports.msp, ports.motors), IDLE, ports.motors,
+                start_ns=BOOT, read_ns=READING,
+            )  # fmt: skip
+            self._program.restart(self._prepare(turns))
+        self._complete(self._calibrate, turns)
+
+    def _complete(self, start: Callable[[], None], turns: Turns | None = None) -> None:
+        """Call `start`; call it again with a new program if part of this one has not started."""
+        for left in reversed(range(STARTS if self._program else 1)):
+            try:
+                start()
+                return
+            except boot.IncompleteStart as error:
+                if not left or not self._program:
+                    raise
+                self.report.note(f"started again: {error}")
+                if self._msp:
+                    self._msp.close()
+                self._program.stop()
+                self._program.restart(self._prepare(turns) if turns else None)
+                self._sender = None
+
+    def _configure(self) -> None:
+        assert self._program is not None
+        boot.configure(self._config, self._program, self._waits)
 
     def _calibrate(self) -> None:
-        """Connect to the firmware and calibrate it; start it again if it does not receive RC channels."""
-        config = self._config
+        """Connect to the firmware, and let it calibrate its sensors."""
         assert self._socket is not None
         self._socket.settimeout(0.0)
         with suppress(OSError):
@@ -103,22 +122,9 @@ class BetaflightLink(ProgramLink):
                 self._drain(0.0)
                 time.sleep(FEED_EVERY)
 
-        for left in reversed(range(STARTS if self._program else 1)):
-            self._take_turns("ready")
-            try:
-                self._msp = boot.connect(config, self._program, self._waits)
-                self._status = boot.settle(config, self._msp, self._program, feed, self._waits, left > 0)
-                return
-            except boot.IncompleteStart as error:
-                if not left:
-                    raise
-                assert self._program is not None
-                self.report.note(f"started again: {error}")
-                if self._msp:
-                    self._msp.close()
-                self._program.stop()
-                self._program.restart(self._turns())
-                self._sender = None
+        self._take_turns("ready")
+        self._msp = boot.connect(self._config, self._program, self._waits)
+        self._status = boot.settle(self._config, self._msp, self._program, feed, self._waits)
 
     def step(self, tick: int, read: Read) -> FirmwareOutput:
         """Send state and sticks at the time of the tick, and return the newest motor outputs."""

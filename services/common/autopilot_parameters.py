@@ -42,17 +42,17 @@ class Parameter(NamedTuple):
     least: float
     most: float
     meaning: str
-    whole: bool = False  # only whole numbers
+    integer: bool = False  # only integers
     at_start: bool = False  # a change takes effect at the next start
 
     def allows(self, value: float) -> bool:
         """Return True if the value is valid."""
-        return self.least <= value <= self.most and not (self.whole and value != int(value))
+        return self.least <= value <= self.most and not (self.integer and value != int(value))
 
     def check(self, value: float) -> None:
         """Raise ConfigError if the value is invalid."""
         if not self.allows(value):
-            kind = "a whole number" if self.whole else "a number"
+            kind = "a whole number" if self.integer else "a number"
             raise ConfigError(self.name, f"got {value:g}", f"{kind} from {self.least:g} to {self.most:g}")
 
 

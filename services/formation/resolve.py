@@ -10,8 +10,8 @@ from lapwing.services.common import ports
 from lapwing.services.common.ports import RotorWrenches
 from lapwing.services.common.schemas.communication_schema import Communication
 from lapwing.services.common.schemas.run_schema import CooperativeLoad
-from lapwing.services.formation.block import FormationLaw
 from lapwing.services.formation.schema import Formation
+from lapwing.services.formation.service import FormationLaw
 
 
 def resolve(scene: Scene) -> ServiceConfig | None:

@@ -46,11 +46,11 @@ def run(process: Participant, spec: Any) -> None:
                 server.log(events[key], time_ns, payload)
                 continue
             messages = []
-            for page in unpack_log_packet(payload)[2]:
-                topic = page.topic.key(config.vehicle)
-                server.declare(topic, page.topic.message.type_name)
-                times = page.ticks * config.interval_ns
-                messages += [(int(t), topic, p.tobytes()) for t, p in zip(times, page.payloads, strict=True)]
+            for batch in unpack_log_packet(payload)[2]:
+                topic = batch.topic.key(config.vehicle)
+                server.declare(topic, batch.topic.message.type_name)
+                times = batch.ticks * config.interval_ns
+                messages += [(int(t), topic, p.tobytes()) for t, p in zip(times, batch.payloads, strict=True)]
             for time_ns, topic, content in sorted(messages, key=lambda m: m[0]):
                 server.put(topic, time_ns, content)
         process.confirm()

@@ -157,31 +157,31 @@ def _json(value: Any) -> bytes:
 
 
 def _parameter(p: Parameter) -> dict[str, Any]:
-    entry = _entry(p.name, p.whole, p.unit, p.meaning[:1].upper() + p.meaning[1:], p.default)
-    limits = {"min": _number(p.least, p.whole), "max": _number(p.most, p.whole)}
+    entry = _entry(p.name, p.integer, p.unit, p.meaning[:1].upper() + p.meaning[1:], p.default)
+    limits = {"min": _number(p.least, p.integer), "max": _number(p.most, p.integer)}
     return entry | limits | ({"rebootRequired": True} if p.at_start else {})
 
 
 def _fact(fact: Fact, value: float) -> dict[str, Any]:
     if fact.assign is None:
         text = "Property of the vehicle (read-only)"
-        return _entry(fact.name, fact.whole, fact.unit, text, value) | {"readOnly": True}
-    entry = _entry(fact.name, fact.whole, fact.unit, "As in PX4", value)
+        return _entry(fact.name, fact.integer, fact.unit, text, value) | {"readOnly": True}
+    entry = _entry(fact.name, fact.integer, fact.unit, "As in PX4", value)
     return entry | ({"rebootRequired": True} if fact.at_reboot else {})
 
 
-def _entry(name: str, whole: bool, unit: str, text: str, default: float) -> dict[str, Any]:
+def _entry(name: str, integer: bool, unit: str, text: str, default: float) -> dict[str, Any]:
     return {
         "name": name,
-        "type": "Int32" if whole else "Float",
+        "type": "Int32" if integer else "Float",
         "shortDesc": text,
         "units": unit,
         "group": name.partition("_")[0],
         "category": "Standard",
-        "decimalPlaces": 0 if whole else 3,
-        "default": _number(default, whole),
+        "decimalPlaces": 0 if integer else 3,
+        "default": _number(default, integer),
     }
 
 
-def _number(value: float, whole: bool) -> float | int:
-    return round(value) if whole else value
+def _number(value: float, integer: bool) -> float | int:
+    return round(value) if integer else value

@@ -113,7 +113,8 @@ class ParameterStore:
         if parameter is None:
             self._reject(endpoint, name, BY_NAME, mavlink.MAV_PARAM_ERROR_DOES_NOT_EXIST)
             return
-        requested = _restore_bound(self._firmware.param_value(value, parameter.whole), parameter.least, parameter.most)
+        decoded = self._firmware.param_value(value, parameter.integer)
+        requested = _restore_bound(decoded, parameter.least, parameter.most)
 
         def on_acknowledgement(acknowledgement: Any) -> None:
             if acknowledgement.result == mavlink.MAV_RESULT_ACCEPTED:
@@ -135,7 +136,7 @@ class ParameterStore:
 
     def _set_fact(self, endpoint: Endpoint, fact: Fact, value: float, trusted: bool) -> None:
         """Set the counterparts of a fact, one after another."""
-        set_value = self._firmware.param_value(value, fact.whole)
+        set_value = self._firmware.param_value(value, fact.integer)
         counterparts = fact.assign(set_value) if fact.assign and math.isfinite(set_value) else None
         error = None
         if fact.assign is None and set_value == fact.value(self._values):
@@ -197,7 +198,7 @@ class ParameterStore:
 
     def _kind(self, name: str) -> int:
         """Return the MAV_PARAM_TYPE of a parameter."""
-        integer = (self._table.get(name) or self._facts[name]).whole
+        integer = (self._table.get(name) or self._facts[name]).integer
         kind: int = mavlink.MAV_PARAM_TYPE_INT32 if integer else mavlink.MAV_PARAM_TYPE_REAL32
         return kind
 

@@ -18,7 +18,7 @@ class Fact(NamedTuple):
 
     name: str
     value: Callable[[Values], float]  # function of the autopilot's parameters
-    whole: bool = True
+    integer: bool = True
     unit: str = ""
     # returns the autopilot's parameters for a value, or None for an unsupported value; None: read-only
     assign: Callable[[float], Values | None] | None = None
@@ -100,7 +100,7 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
     def is_fitted(sensor: str) -> int:
         return int(not d.sensors or sensor in d.sensors)  # without sensors the ground truth replaces all of them
 
-    whole = {
+    integers = {
         "SYS_AUTOSTART": GENERIC_FRAMES.get(len(d.rotors), GENERIC_FRAMES[4]),
         "SYS_HITL": 0,
         "SYS_HAS_NUM_ASPD": int("airspeed" in d.sensors),
@@ -120,17 +120,17 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
         "BAT1_SOURCE": _POWER_MODULE if d.battery else _NO_SOURCE,
         "BAT1_N_CELLS": d.battery.cells if d.battery else 0,
     }
-    whole |= {
+    integers |= {
         f"RC_MAP_{axis}": 0 for axis in ("ROLL", "PITCH", "YAW", "THROTTLE", "FLAPS", "AUX1", "AUX2", *NO_SWITCHES)
     }
-    whole |= {f"COM_FLTMODE{slot}": -1 for slot in range(1, 7)}
-    whole |= {output_function(k + 1): FIRST_MOTOR + k for k in range(len(d.rotors))}
+    integers |= {f"COM_FLTMODE{slot}": -1 for slot in range(1, 7)}
+    integers |= {output_function(k + 1): FIRST_MOTOR + k for k in range(len(d.rotors))}
     own_type = vehicle_type(len(d.rotors))
     return [
         _setting(SYSTEM_ID, d.system_id, _IDS, at_reboot=True),
         _setting(COMPONENT_ID, mavlink.MAV_COMP_ID_AUTOPILOT1, _IDS, at_reboot=True),
         _setting(TYPE, own_type, {own_type, *_MULTIROTORS}),
-        *[Fact(name, lambda _, value=value: float(value)) for name, value in whole.items()],  # type: ignore[misc]
+        *[Fact(name, lambda _, value=value: float(value)) for name, value in integers.items()],  # type: ignore[misc]
         *[Fact(f"SENS_BOARD_{axis}_OFF", lambda _: 0.0, False, "deg") for axis in "XYZ"],
         *(_battery(d.battery) if d.battery else ()),
         *[Fact(f"RC_{switch}_TH", lambda _: THRESHOLD, False) for switch in NO_THRESHOLDS],

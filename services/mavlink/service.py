@@ -167,28 +167,28 @@ def _open_servers(process: Participant, spec: Any, stack: ExitStack) -> dict[str
 def _handle_log_packet(servers: Mapping[str, LinkServer], payload: bytes, immediate: bool, interval_ns: int) -> None:
     """Handle all commands, acknowledgements and statuses of a log packet, and the newest message of other topics.
 
-    A page has messages of equal length, so a topic whose messages vary in length has several, which overlap in time.
+    A batch has messages of equal length, so a topic whose messages vary in length has several, which overlap in time.
     """
-    *_, pages = unpack_log_packet(payload)
+    *_, batches = unpack_log_packet(payload)
     ordered = []  # (tick, True for an estimate, which comes last, server, topic, payload)
     newest: dict[Any, int] = {}  # tick by topic
-    for page in pages:
-        topic = template_topic(page.topic)
+    for batch in batches:
+        topic = template_topic(batch.topic)
         if topic is ESTIMATE and immediate:
             continue
-        if page.payloads.shape[1] <= EMPTY_SIZES.get(topic, 0):
+        if batch.payloads.shape[1] <= EMPTY_SIZES.get(topic, 0):
             continue
-        page_servers = [servers[page.topic.vehicle]] if page.topic.vehicle else servers.values()
+        batch_servers = [servers[batch.topic.vehicle]] if batch.topic.vehicle else servers.values()
         if topic in ALL:
-            for server in page_servers:
+            for server in batch_servers:
                 ordered += [
                     (int(tick), topic is ESTIMATE, server, topic, row)
-                    for tick, row in zip(page.ticks, page.payloads, strict=True)
+                    for tick, row in zip(batch.ticks, batch.payloads, strict=True)
                 ]
-        elif page.ticks[-1] >= newest.get(page.topic, -1):
-            newest[page.topic] = int(page.ticks[-1])
-            for server in page_servers:
-                server.adapter.vehicle.put(topic, page.payloads[-1].tobytes())
+        elif batch.ticks[-1] >= newest.get(batch.topic, -1):
+            newest[batch.topic] = int(batch.ticks[-1])
+            for server in batch_servers:
+                server.adapter.vehicle.put(topic, batch.payloads[-1].tobytes())
     ordered.sort(key=itemgetter(0, 1))
     for tick, _, server, topic, row in ordered:
         server.handle(topic, tick * interval_ns, row.tobytes())

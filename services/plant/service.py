@@ -109,7 +109,7 @@ class PropellerFailures:
 
     def __init__(self, plant: PlantConfig):
         self._steps = {tick: tuple(events) for tick, events in groupby(plant.events, lambda event: event.tick)}
-        self._form = multirotor_euler if plant.euler else multirotor_multibody
+        self._formulation = multirotor_euler if plant.euler else multirotor_multibody
         self._core, self._bodies = plant.core, plant.bodies
         self.events = [tick + 1 for tick in self._steps]
         self.replacements: dict[int, list[tuple[Block, BoundBlock]]] = {}
@@ -120,7 +120,7 @@ class PropellerFailures:
         for tick, events in self._steps.items():
             failures, p = [], core.vehicle
             for event in events:
-                p = self._form.with_propeller_failure(p, event.propeller, event.becomes)
+                p = self._formulation.with_propeller_failure(p, event.propeller, event.becomes)
                 failures.append(Failure(event.time, p, event.becomes == "locked"))
             failing, core = FailingMultirotorPlant(core, tuple(failures)), core._replace(vehicle=p)
             view = self._bodies._replace(vehicle=p)

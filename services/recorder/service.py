@@ -59,9 +59,9 @@ def run(process: Participant, spec: Any) -> None:
                         writer.metadata = failure(text, head == DIVERGED_KEY) | writer.metadata
                     continue
                 pending.add(name, payload, time_ns // config.interval_ns)
-                pages = pending.complete()
-                if pages:
-                    recording.write(pages, pending.written - 1)
+                batches = pending.complete()
+                if batches:
+                    recording.write(batches, pending.written - 1)
                     process.report_rejected()
                 progress.recorded(pending.written)  # also if no tick was completed: shows that the recorder runs
             process.confirm()
@@ -96,7 +96,7 @@ class Pending:
         """Create an empty buffer for these services."""
         self._stop = dict.fromkeys(services, 0)  # first tick that each has not published
         self._unfinished = set(services)  # services that have not ended
-        self._pages: list[RecordBatch] = []
+        self._batches: list[RecordBatch] = []
         self.written = 0  # all ticks before this one are complete
 
     @property
@@ -114,9 +114,9 @@ class Pending:
             self._check(name, end)
             self._unfinished.discard(name)
             return
-        start, stop, pages = unpack_log_packet(payload)
+        start, stop, batches = unpack_log_packet(payload)
         self._check(name, start)
-        self._pages += pages
+        self._batches += batches
         self._stop[name] = stop
 
     def _check(self, name: str, tick: int) -> None:
@@ -130,7 +130,7 @@ class Pending:
         if stop <= self.written:
             return []
         self.written = stop
-        complete, self._pages = split_at(self._pages, stop)
+        complete, self._batches = split_at(self._batches, stop)
         return complete
 
     def waits_for(self) -> str:

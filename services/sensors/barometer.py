@@ -82,8 +82,9 @@ def position_error(e: StaticPressureError | None, truth: Truth) -> float:
 
 @always_inline
 def _true_pressure(p: Barometer, truth: Truth) -> float:
-    static = pressure(truth.atmosphere, truth.home.height + height_above_home(truth.home, truth.position_world))
-    return static + position_error(p.static_pressure_error, truth) + p.wash_pa_per_n * truth.thrust
+    home = truth.environment.home
+    static = pressure(truth.environment.atmosphere, home.height + height_above_home(home, truth.position_world))
+    return static + position_error(p.static_pressure_error, truth) + p.wash_pa_per_n * truth.rotors.thrust
 
 
 @kernel

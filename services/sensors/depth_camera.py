@@ -67,7 +67,7 @@ def pixels(p: DepthCamera) -> tuple[np.ndarray, np.ndarray]:
 def topic_encoders(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
     """Return the encoder of the sensor's topic."""
     p: DepthCamera = instrument.sensor
-    terrain = as_relief(instrument.around.terrain)
+    terrain = as_relief(instrument.environment.terrain)
     directions, cosines = pixels(p)
 
     def depths(x: ScanPose, time_ns: np.ndarray) -> Fields:

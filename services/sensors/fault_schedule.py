@@ -5,17 +5,17 @@ from collections.abc import Mapping, Sequence
 from typing import Annotated, Any, Literal
 
 from annotated_types import Ge, Le, Len
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import ConfigDict, Field, ValidationError
 
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.validation import fault
+from lapwing.dynamics.validation import Table, fault
 from lapwing.services.sensors.delay_line import ALL_CHANNELS, DEPTH, DRIFT, KINDS, Fault
 
 SLOTS = 4  # faults of a sensor; a fixed number, so that all schedules share their machine code
 _FOREVER = 2**62  # [tick]
 
 
-class FaultTable(BaseModel):
+class FaultTable(Table):
     """Scene table of a sensor fault.
 
     `dropout`: invalid readings. `freeze`: the last value repeated. `bias`: `size` added. `spikes`: with `probability`,
@@ -23,7 +23,7 @@ class FaultTable(BaseModel):
     multiplied by `size`. `delay`: `samples` added to the latency.
     """
 
-    model_config = ConfigDict(extra="forbid", frozen=True)
+    model_config = ConfigDict(strict=False, allow_inf_nan=True)
     kind: Literal["dropout", "freeze", "bias", "spikes", "drift", "scale", "delay"]  # type of the fault
     start: Annotated[float, Ge(0)] = 0.0  # [s] simulation time
     stop: float = math.inf  # [s] simulation time; default: until the end of the run

@@ -155,8 +155,8 @@ def _solution(p: Gps, s: GpsState, antenna: Vec3, truth: Truth, key: Key, tick: 
     fix = _fix_kind(p.rtk, s.rtk, p.fix_status)
     white, correlated = _range_deviations(p, ratio(p.rtk, fix))
     return solution(
-        p.constellation, truth.home, truth.terrain, antenna, s.samples / p.rate, s.ranges, correlated, white,
-        fix >= GPS_FLOAT, key, tick,
+        p.constellation, truth.environment.home, truth.environment.terrain, antenna, s.samples / p.rate, s.ranges,
+        correlated, white, fix >= GPS_FLOAT, key, tick,
     )  # fmt: skip
 
 
@@ -206,7 +206,7 @@ def sample(p: Gps, s: GpsState, key: Key, tick: int, truth: Truth) -> tuple[GpsS
     velocity_line, velocity, velocity_valid = apply_delay_and_faults(
         p.faults, s.velocity_line, p.latency_samples, 1, key, tick, velocity
     )
-    latitude, longitude, height = enu_to_geodetic(truth.home, position)
+    latitude, longitude, height = enu_to_geodetic(truth.environment.home, position)
     valid = position_valid and velocity_valid and has_fix
     reported_kind = kind if p.constellation is not None or p.rtk is not None else 0
     reading = GpsReading(

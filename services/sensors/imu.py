@@ -1,20 +1,27 @@
 """Inertial measurement unit: three gyroscopes and three accelerometers (theory, section 3.2)."""
 
-from typing import Annotated, NamedTuple
+from typing import Annotated, Any, NamedTuple
 
 from annotated_types import Ge, Gt, Le, Lt
 
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
+from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion, conjugate, log, multiply, rotate, rotate_back
 from lapwing.dynamics.noise import Key, normal
-from lapwing.dynamics.vector import ZERO, Vec3, add, scale, subtract
-from lapwing.kernels import kernel
+from lapwing.dynamics.vector import ZERO, Vec3, add, cross, scale, subtract
+from lapwing.kernels import always_inline, kernel
 from lapwing.services.common.ports import ImuReading
-from lapwing.services.sensors import error_models, imu_motion
+from lapwing.services.sensors import error_models
 from lapwing.services.sensors.delay_line import DEPTH, Fault
-from lapwing.services.sensors.imu_motion import Vibration
 from lapwing.services.sensors.low_pass import LowPass, check_low_pass
-from lapwing.services.sensors.rotor_vibration import AT_REST, Phases, RotorVibration, initial_phases, vibration
+from lapwing.services.sensors.rotor_vibration import (
+    AT_REST,
+    Phases,
+    RotorVibration,
+    Vibration,
+    initial_phases,
+    vibration,
+    vibration_at,
+)
 from lapwing.services.sensors.sensor_inputs import Place, Truth
 from lapwing.services.sensors.triad import (
     BLANK_TRIAD,
@@ -87,16 +94,54 @@ def blank() -> ImuState:
 
 
 @kernel
+def _force_at(position: Vec3 | None, truth: Truth, force: Vec3) -> Vec3:
+    """Return the specific force [m/s^2] at a position on the rotating body (theory, eq. (3.37))."""
+    if position is None:
+        return force
+    omega = truth.omega_body
+    turning = add(cross(truth.angular_acceleration_body, position), cross(omega, cross(omega, position)))
+    return add(force, turning)
+
+
+@always_inline
+def _true_values(p: Any, truth: Truth) -> tuple[Vec3, Vec3]:
+    """Return rate [rad/s] and specific force [m/s^2], body, at the accelerometers."""
+    a = truth.acceleration_world
+    force = rotate_back(truth.attitude, (a[0], a[1], a[2] + truth.environment.gravity))
+    return truth.omega_body, _force_at(p.position, truth, force)
+
+
+@kernel
+def _velocity_world(position: Vec3 | None, truth: Truth) -> Vec3:
+    """Return the world velocity [m/s] of a position on the body."""
+    if position is None:
+        return truth.velocity_world
+    return add(truth.velocity_world, rotate(truth.attitude, cross(truth.omega_body, position)))
+
+
+@always_inline
+def _means(p: Any, s: Any, truth: Truth, velocity_world: Vec3) -> tuple[Vec3, Vec3]:
+    """Return the mean rate [rad/s] and specific force [m/s^2] over the interval (theory, eq. (3.43)).
+
+    The rate is the rotation vector from the previous attitude; the force is in that attitude. Both include coning and
+    sculling.
+    """
+    rotation = log(multiply(conjugate(s.attitude), truth.attitude))
+    a = scale(p.rate, subtract(velocity_world, s.velocity_world))
+    return scale(p.rate, rotation), rotate_back(s.attitude, (a[0], a[1], a[2] + truth.environment.gravity))
+
+
+@kernel
 def initial(p: Imu, key: Key, truth: Truth) -> ImuState:
     """Return the state before the first sample; draw the errors of this unit and of this start."""
-    omega, force = imu_motion.true_values(p, truth)
+    omega, force = _true_values(p, truth)
     return ImuState(
         new_triad(gyro_units(p.gyro), p.cross_coupling, key, 0, p.warm_up_rise, omega),
         new_triad(accelerometer_units(p.accelerometer), p.cross_coupling, key, 8, p.warm_up_rise, force),
         p.warm_up_rise,
         0.0,
         truth.attitude,
-        imu_motion.velocity_world(p.position, truth),
+        _velocity_world(p.position, truth),
         initial_phases(p.rotor_vibration, key),
         force,
     )
@@ -113,18 +158,18 @@ def sample(p: Imu, s: ImuState, key: Key, tick: int, truth: Truth) -> tuple[ImuS
         tick: integer, different for every sample.
         truth: `Truth` at this tick.
     """
-    omega, force = imu_motion.true_values(p, truth)
+    omega, force = _true_values(p, truth)
     velocity_world = s.velocity_world
     if p.delta_output:
-        velocity_world = imu_motion.velocity_world(p.position, truth)
+        velocity_world = _velocity_world(p.position, truth)
         if tick > 0:
-            omega, force = imu_motion.means(p, s, truth, velocity_world)
+            omega, force = _means(p, s, truth, velocity_world)
     true_force, jitter = force, 0.0
     if p.sampling_jitter > 0.0:
         jitter = p.sampling_jitter * normal(key, tick, _JITTER)
         omega = add(omega, scale(jitter, truth.angular_acceleration_body))
         force = add(force, scale(jitter * p.rate, subtract(force, s.force)))
-    phase, shake = imu_motion.vibration_at(p.vibration, p.delta_output, p.rate, s.phase, truth)
+    phase, shake = vibration_at(p.vibration, p.delta_output, p.rate, s.phase, truth)
     force = add(force, shake)
     warm_up = s.warm_up * (1.0 - 1.0 / (p.rate * p.warm_up_time))
     g, a = gyro_units(p.gyro), accelerometer_units(p.accelerometer)

@@ -83,7 +83,7 @@ def rays(p: Lidar) -> np.ndarray:
 def topic_encoders(frame: str, port: Port, instrument: Any) -> list[TopicEncoder]:
     """Return the encoder of the sensor's topic."""
     p: Lidar = instrument.sensor
-    terrain, directions = as_relief(instrument.around.terrain), rays(p)
+    terrain, directions = as_relief(instrument.environment.terrain), rays(p)
 
     def ranges(x: ScanPose, time_ns: np.ndarray) -> Fields:
         return {**stamp_columns(time_ns), "ranges": scan_distances(instrument, terrain, directions, x).astype("<f4")}

@@ -57,8 +57,8 @@ def blank() -> MagnetometerState:
 @always_inline
 def _true_field(p: Magnetometer, truth: Truth) -> Vec3:
     """Return the field [T] of the Earth and of the motors' leads, body."""
-    earth = rotate_back(truth.attitude, truth.magnetic_field_world)
-    return add(earth, scale(truth.motor_current * _NANO, p.current_nt_per_a))
+    earth = rotate_back(truth.attitude, truth.environment.magnetic_field_world)
+    return add(earth, scale(truth.rotors.current * _NANO, p.current_nt_per_a))
 
 
 @always_inline

@@ -58,7 +58,7 @@ def blank() -> OpticalFlowState:
 @always_inline
 def _true_flow(truth: Truth) -> Vec3:
     """Return the flow about x and about y [rad/s], and the distance [m]."""
-    distance = to_ground(truth.terrain, truth.position_world, rotate(truth.attitude, (0.0, 0.0, -1.0)))
+    distance = to_ground(truth.environment.terrain, truth.position_world, rotate(truth.attitude, (0.0, 0.0, -1.0)))
     v, omega = rotate_back(truth.attitude, truth.velocity_world), truth.omega_body
     inverse = 1.0 / max(distance, 1e-6)
     return omega[0] + v[1] * inverse, omega[1] - v[0] * inverse, distance

@@ -79,7 +79,7 @@ def _distance(p: Rangefinder, truth: Truth) -> float:
     direction = (across * math.cos(azimuth), across * math.sin(azimuth), math.sin(elevation))
     origin = add(truth.position_world, rotate(truth.attitude, p.position))
     ray_world = rotate(truth.attitude, direction)
-    ground = to_ground(truth.terrain, origin, ray_world)
+    ground = to_ground(truth.environment.terrain, origin, ray_world)
     return reduce_tuple(_nearest, (origin, ray_world), ground, truth.others, truth.others)
 
 

@@ -24,13 +24,13 @@ from lapwing.services.common.schemas.communication_schema import Communication, 
 from lapwing.services.common.schemas.environment_schema import environment
 from lapwing.services.common.schemas.run_schema import Run
 from lapwing.services.common.schemas.vehicle_schema import Vehicle, VehicleAirframe, airframe, gravity
-from lapwing.services.sensors.block import Instrument
 from lapwing.services.sensors.gps import Gps
 from lapwing.services.sensors.imu import Imu
 from lapwing.services.sensors.rotor_vibration import Damage
 from lapwing.services.sensors.scan import ScanPose, VehiclePose
 from lapwing.services.sensors.schema import Sensors, module_of, parameters
 from lapwing.services.sensors.sensor_inputs import OtherVehicle, Truth
+from lapwing.services.sensors.service import Instrument
 
 
 def resolve(scene: Scene) -> ServiceConfig | None:
@@ -39,6 +39,7 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     if not tables:
         return None
     instruments, outputs = [], []
+    surroundings = environment(scene)._replace(gravity=gravity(scene))
     for name, table in sorted(tables.items()):
         p = parameters(name, table, scene[Communication].interval)
         if name == ports.IMU:
@@ -46,14 +47,14 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         elif name == ports.GPS:
             p = _with_terrain(scene, p)
         key = stream_key(scene[Run].seed, scene[Vehicle].name, name)
-        instruments.append(Instrument(p, key, gravity(scene), environment(scene)))
+        instruments.append(Instrument(p, key, surroundings))
         reading = trial_reading(name, table, p) if "module" in table else module_of(name, table).READING
         outputs.append(Port(name, reading, ticks(scene, p.rate, f"sensors.{name}.rate")))
         for unit in ports.IMUS[1 : p.instances] if name == ports.IMU else ():
             if unit in tables:
                 raise ConfigError(f"sensors.{unit}", "is the name of a redundant unit of sensors.imu", "another name")
             key = stream_key(scene[Run].seed, scene[Vehicle].name, unit)
-            instruments.append(Instrument(p._replace(faults=None), key, gravity(scene), environment(scene)))
+            instruments.append(Instrument(p._replace(faults=None), key, surroundings))
             outputs.append(outputs[-1]._replace(name=unit))
     return ServiceConfig(tuple(instruments), (InputPort(ports.TRUTH),), tuple(outputs))
 

@@ -1,11 +1,11 @@
-"""Vibration of an inertial measurement unit by each rotor: imbalance and blade passage (theory, eq. (3.49))."""
+"""Vibration of an inertial measurement unit by the rotors (theory, eqs. (3.44) and (3.49))."""
 
 from typing import Annotated, Any, NamedTuple
 
 from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.noise import TURN_ON, Key, normal3
-from lapwing.dynamics.vector import ZERO, Vec3
+from lapwing.dynamics.vector import ZERO, Vec3, scale
 from lapwing.kernels import kernel, math
 from lapwing.services.sensors.low_pass import LowPass, response
 from lapwing.services.sensors.sensor_inputs import ROTORS, Truth
@@ -13,7 +13,16 @@ from lapwing.services.sensors.triad import MG
 
 Phases = tuple[float, ...]  # [rad] of ROTORS rotors
 AT_REST: Phases = (0.0,) * ROTORS
+Amplitude = Annotated[float, Ge(0), Le(1e5)]
 _LANE = 40  # lanes of the random imbalances and phases, above those of the triads
+
+
+class Vibration(NamedTuple):
+    """Vibration of the accelerometers by unbalanced rotors, at their mean speed."""
+
+    amplitude_mg: tuple[Amplitude, Amplitude, Amplitude]  # [mg] body, proportional to the square of the rotor speed
+    rotor_speed: Annotated[float, Gt(0), Le(1e5)]  # [rad/s] of that amplitude
+    harmonic: Annotated[float, Gt(0), Le(16)] = 1.0  # of the rotor speed; the number of blades for blade passage
 
 
 class Damage(NamedTuple):
@@ -28,11 +37,29 @@ class RotorVibration(NamedTuple):
     """Vibration of the accelerometers by each rotor; amplitudes are proportional to the square of its speed."""
 
     rotor_speed: Annotated[float, Gt(0), Le(1e5)]  # [rad/s] of these amplitudes
-    imbalance_mg: Annotated[float, Ge(0), Le(1e5)] = 0.0  # [mg] body x and y, one standard deviation over rotors
-    blade_pass_mg: Annotated[float, Ge(0), Le(1e5)] = 0.0  # [mg] body z, at `blades` times the rotor speed
+    imbalance_mg: Amplitude = 0.0  # [mg] body x and y, one standard deviation over rotors
+    blade_pass_mg: Amplitude = 0.0  # [mg] body z, at `blades` times the rotor speed
     blades: Annotated[int, Gt(0), Le(16)] = 2  # of a rotor
     damage_mg: Annotated[float, Ge(0), Le(1e6)] = 0.0  # [mg] imbalance of a rotor that has lost all its thrust
     damage: Damage | None = None  # compiled from the scene's `effects.rotor_damage`
+
+
+@kernel
+def vibration_at(
+    vibration: Vibration | None, delta_output: bool, rate: float, phase: float, truth: Truth
+) -> tuple[float, Vec3]:
+    """Return the phase [rad] of the vibration and its specific force [m/s^2] (theory, eq. (3.44))."""
+    if vibration is None:
+        return phase, ZERO
+    turn = vibration.harmonic * truth.rotors.speed / rate
+    ratio, middle = truth.rotors.speed / vibration.rotor_speed, phase + turn
+    size = ratio * ratio * MG
+    if delta_output:
+        middle = phase + 0.5 * turn
+        size *= math.sin(0.5 * turn) / (0.5 * turn) if turn > 0.0 else 1.0
+    x, y, z = scale(size, vibration.amplitude_mg)
+    shake = (x * math.cos(middle), y * math.sin(middle), z * math.cos(middle))
+    return (phase + turn) % (2.0 * math.pi), shake
 
 
 @kernel
@@ -65,7 +92,7 @@ def _wave(low_pass: LowPass | None, averaged: bool, rate: float, omega: float, p
 
 @kernel
 def _next_phase(phases: Phases, truth: Truth, rate: float, i: int) -> float:
-    return (phases[i] + truth.rotor_speeds[i] / rate) % (2.0 * math.pi)
+    return (phases[i] + truth.rotors.speeds[i] / rate) % (2.0 * math.pi)
 
 
 @kernel
@@ -106,7 +133,7 @@ def vibration(
     )  # fmt: skip
     x = y = z = across = along = 0.0
     for i in range(ROTORS):
-        speed = truth.rotor_speeds[i]
+        speed = truth.rotors.speeds[i]
         ratio = speed * speed / (v.rotor_speed * v.rotor_speed)
         size, push = _imbalance(v, key, tick, i) * ratio, v.blade_pass_mg * ratio
         gain, phase = _wave(low_pass, p.delta_output, p.rate, speed, phases[i] + speed * jitter)

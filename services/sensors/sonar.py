@@ -57,7 +57,8 @@ RAYS = 8  # along the edge of the beam, for obstacles off its axis
 @generic(inline=True)
 def _distance(p: types.Type, truth: types.Type) -> Any:
     """Return the distance to the nearest ground in the beam; +inf without an echo (theory, eq. (3.16))."""
-    return _over_level if truth.types[truth.fields.index("terrain")].instance_class is Level else _over_relief
+    around = truth.types[truth.fields.index("environment")]
+    return _over_level if around.types[around.fields.index("terrain")].instance_class is Level else _over_relief
 
 
 @always_inline
@@ -75,11 +76,11 @@ def _over_relief(p: Sonar, truth: Truth) -> float:
     R, origin, beam = rotation_matrix(truth.attitude), truth.position_world, math.radians(p.half_beam_deg)
     axis = (-R[2], -R[5], -R[8])
     farthest = min(1.5 * p.range_max, FARTHEST)
-    along = ray(truth.terrain, origin, axis, farthest)
+    along = ray(truth.environment.terrain, origin, axis, farthest)
     if along == math.inf:
         return math.inf
     place = add(origin, scale(along, axis))
-    _, normal = surface(truth.terrain, place[0], place[1])
+    _, normal = surface(truth.environment.terrain, place[0], place[1])
     cosine = -dot(normal, axis)
     angle = math.acos(min(max(cosine, -1.0), 1.0))
     if angle > math.radians(p.tilt_max_deg):
@@ -88,7 +89,7 @@ def _over_relief(p: Sonar, truth: Truth) -> float:
     for i in range(RAYS):
         turn = 2.0 * math.pi * i / RAYS
         edge = (math.sin(beam) * math.cos(turn), math.sin(beam) * math.sin(turn), -math.cos(beam))
-        result = min(result, ray(truth.terrain, origin, apply(R, edge), farthest))
+        result = min(result, ray(truth.environment.terrain, origin, apply(R, edge), farthest))
     return result
 
 
@@ -105,7 +106,7 @@ def _heard_distance(echo: Echo | None, range_max: float, key: Key, tick: int, tr
         return distance
     level = 20.0 / _BEL * math.log(range_max / distance) + 2.0 * echo.absorption_db_per_m * (range_max - distance)
     level += echo.fading_db * normal(key, tick, _FADING_LANE) - echo.ground_loss_db
-    speed = truth.rotor_speed / echo.rotor_speed
+    speed = truth.rotors.speed / echo.rotor_speed
     noise = (math.exp(0.1 * _BEL * echo.propeller_noise_db) - 1.0) * (speed * speed * speed * speed * speed)
     return distance if level >= 10.0 / _BEL * math.log(1.0 + noise) else math.inf
 

@@ -5,12 +5,12 @@ from collections.abc import Iterator
 from types import ModuleType
 from typing import Annotated, Any
 
-from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, SerializeAsAny, ValidationError, model_validator
+from pydantic import BeforeValidator, ConfigDict, Field, SerializeAsAny, ValidationError, model_validator
 
 from lapwing.cosim.config.user_module import FAULTS, blame
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.dynamics.validation import fault
+from lapwing.dynamics.validation import Table, fault
 from lapwing.services.common import user_code, user_modules
 from lapwing.services.trajectory.polynomial_piece import Piece
 from lapwing.services.trajectory.segments import KINDS, choose
@@ -41,10 +41,10 @@ def _segments(value: object) -> tuple[Segment, ...]:
 Segments = Annotated[tuple[SerializeAsAny[Segment], ...], BeforeValidator(_segments)]
 
 
-class Phase(BaseModel):
+class Phase(Table):
     """A named part of the trajectory."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(strict=False)
 
     name: Annotated[str, Field(min_length=1)]  # shown in status and reports
     duration: Positive | None = None  # [s] default: duration of the longest channel
@@ -55,10 +55,10 @@ class Phase(BaseModel):
     release: bool = False  # release the payload in this phase once the vehicle rests on the ground
 
 
-class Phases(BaseModel):
+class Phases(Table):
     """All phases of a trajectory in order."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(strict=False)
 
     phase: Annotated[tuple[Phase, ...], Field(min_length=1, strict=False)]  # in the order of flight
 

@@ -28,12 +28,12 @@ def resolve(scene: Scene) -> ServiceConfig | None:
     if not follows_trajectory(scene):
         return None
     exchange = scene[Communication]
-    trajectory, result = scene[Trajectory], compile_trajectory(scene)
+    result = compile_trajectory(scene)
     path = result.parameters._replace(origin_world=start_place(scene))
     core = TrajectoryPath(path, result.final, exchange.interval)
     lead_ticks = max(1, round(LEAD * exchange.rate))
     return ServiceConfig(
-        TrajectoryConfig(core, result.phases, trajectory.leader or "", trajectory.frame != "world"),
+        TrajectoryConfig(core, result.phases),
         (InputPort(ports.TRUTH, lead_ticks),),
         (Port(ports.TRAJECTORY, Setpoint()),),
     )
@@ -49,23 +49,27 @@ def fleet(
     Raises:
         ConfigError: a leader does not exist or follows another vehicle.
     """
-    return {name: _follower_config(name, shares, keys[name]) if share.parameters.leader else share
+    tables = {name: scenes[name][Trajectory] for name in shares}
+    alone = {name: share.parameters.core for name, share in shares.items() if not tables[name].leader}
+    return {name: _follower_config(share, tables[name], alone, keys[name]) if tables[name].leader else share
             for name, share in shares.items()}  # fmt: skip
 
 
-def _follower_config(name: str, shares: Mapping[str, ServiceConfig], key: str) -> ServiceConfig:
-    own = shares[name].parameters
-    others = [other for other, share in shares.items() if other != name and not share.parameters.leader]
-    if own.leader not in others:
-        expected = f"a vehicle with a trajectory and no leader: {', '.join(others) or 'there is none'}"
-        raise ConfigError(f"{key}trajectory.leader", f"got {own.leader}", expected)
-    path, core = shares[own.leader].parameters.core, own.core
+def _follower_config(
+    share: ServiceConfig, table: Trajectory, leaders: Mapping[str, TrajectoryPath], key: str
+) -> ServiceConfig:
+    leader = table.leader or ""
+    if leader not in leaders:
+        expected = f"a vehicle with a trajectory and no leader: {', '.join(leaders) or 'there is none'}"
+        raise ConfigError(f"{key}trajectory.leader", f"got {leader}", expected)
+    path, core = leaders[leader], share.parameters.core
     if all(np.array_equal(*pair) for pair in zip(_numbers(core.path), _numbers(path.path), strict=True)):
-        message = f"repeats the phases of {own.leader}, which doubles the displacement"
+        message = f"repeats the phases of {leader}, which doubles the displacement"
         raise ConfigError(f"{key}trajectory.phase", message, "phases relative to the leader")
     origin = subtract(core.path.origin_world, path.path.origin_world)
     relative = core._replace(path=core.path._replace(origin_world=origin))
-    return shares[name]._replace(parameters=own._replace(core=FollowedPath(path, relative, own.heading)))
+    follower = FollowedPath(path, relative, heading=table.frame != "world")
+    return share._replace(parameters=share.parameters._replace(core=follower))
 
 
 def _numbers(path: Parameters) -> list[np.ndarray]:

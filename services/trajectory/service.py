@@ -16,12 +16,10 @@ NAME = "trajectory"
 
 
 class TrajectoryConfig(NamedTuple):
-    """Resolved configuration of the service."""
+    """Parameters of the service's block, and names for its messages."""
 
     core: TrajectoryPath | FollowedPath
     phases: tuple[str, ...]  # names by index
-    leader: str = ""  # name of the leader; "": none
-    heading: bool = True  # displacements are in axes along the leader's heading
 
 
 def create(config: RunConfig) -> Service:

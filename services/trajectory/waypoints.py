@@ -4,10 +4,11 @@ from collections.abc import Sequence
 from itertools import pairwise
 from typing import Annotated, Any, Literal, NamedTuple
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.geodesy import Home
+from lapwing.dynamics.validation import Table
 from lapwing.dynamics.vector import ZERO
 from lapwing.kernels import math
 from lapwing.kernels.math import dist
@@ -35,10 +36,10 @@ class Waypoint(PlaceTable):
         return place if self.yaw_deg is None else [*place, math.radians(self.yaw_deg)]
 
 
-class Route(BaseModel):
+class Route(Table):
     """Waypoints, and the manner of flight between them."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(strict=False)
 
     waypoints: Points = ()  # [m] x, y, z, instead of phases; or tables: x, y or latitude_deg, longitude_deg; z; yaw_deg
     speed: Positive = 2.0  # [m/s] largest speed between waypoints

@@ -15,6 +15,7 @@ from lapwing.dynamics import discovery
 from lapwing.dynamics.lie.quaternion import Quaternion, rotation_matrix
 from lapwing.studies.stability import cases
 from lapwing.studies.stability.cases import toppling
+from tests.combinations import rest_nightly
 
 FOLDER = Path(__file__).parents[2] / "benchmarks"
 DEFINED = {path.stem for path in FOLDER.glob("[a-z]*.py")} | {path.parent.name for path in FOLDER.glob("*/__main__.py")}
@@ -26,7 +27,7 @@ def benchmark(name: str, *arguments: str) -> subprocess.CompletedProcess[str]:
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("name", sorted(DEFINED))
+@pytest.mark.parametrize("name", rest_nightly(*sorted(DEFINED), keep=5))
 def test_help_describes_benchmark_without_measurement(name):
     if name == "fmu_coupling":
         pytest.importorskip("fmpy")

@@ -75,9 +75,9 @@ def fly_apart(config, operator):
         ended = graphs[CLOCK_OWNER].ended
         for i, (name, diagram) in enumerate(graphs.items()):
             if ended or diagram.tick - handed[name] >= 11 + 6 * i:
-                pages = diagram.record_batches(handed[name], diagram.tick)
-                _, stop, pages = unpack_log_packet(pack_log_packet(pages, handed[name], diagram.tick))
-                log.write(pages, stop - 1)
+                batches = diagram.record_batches(handed[name], diagram.tick)
+                _, stop, batches = unpack_log_packet(pack_log_packet(batches, handed[name], diagram.tick))
+                log.write(batches, stop - 1)
                 handed[name] = stop
     return log
 

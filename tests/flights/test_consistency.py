@@ -9,6 +9,7 @@ from lapwing.flights import consistency
 from lapwing.flights.metrics import metrics
 from lapwing.flights.rotation_arrays import conjugate, from_xyzw, product, rotation_vector
 from lapwing.services.autopilot.estimator.filter_state import SIZE
+from tests.combinations import rest_nightly
 
 HOVER = {
     "trajectory.phase": [
@@ -62,7 +63,9 @@ def vertical_speed_sigmas(flight):
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("overrides", [HOVER, {}, WIND, GPS_LOSS], ids=["hover", "mission", "wind", "gps loss"])
+@pytest.mark.parametrize(
+    "overrides", rest_nightly(HOVER, {}, WIND, GPS_LOSS, keep=2), ids=["hover", "mission", "wind", "gps loss"]
+)
 def test_joint_nees_is_within_its_bounds(overrides):
     seeds = range(101, 201)  # one flight at a time: a hundred take 5 GB
     values = [metrics(lapwing.fly("delivery_mission", seed=seed, overrides=overrides))["nees"] for seed in seeds]

@@ -22,7 +22,7 @@ class RecordedPorts:
     def __init__(self, config: RunConfig):
         self.config = config
         ports = {port.name for service in config.services.values() for port in service.ports}
-        self.diagram = BlockDiagram(config, create_all(config), 1, whole=ports)
+        self.diagram = BlockDiagram(config, create_all(config), 1, full_history=ports)
         self.diagram.advance(config.last_tick + 1)
         self.ticks = self.diagram.tick
 
@@ -51,7 +51,7 @@ class DrivenService(RecordedPorts):
         service = create(config, name)
         own = {port.name for block in service.blocks for port in block.outputs}
         read = {i.port for block in service.blocks for i in block.inputs} - own
-        self.diagram = BlockDiagram(config, [service], 1, whole=own | read)
+        self.diagram = BlockDiagram(config, [service], 1, full_history=own | read)
         for tick in range(config.last_tick + 1):
             for port in sorted(read):
                 if tick % self.diagram.ports[port].period == 0:

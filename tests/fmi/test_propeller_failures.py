@@ -15,7 +15,7 @@ from fmpy.validation import validate_fmu
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.fmi.export.exported_part import export_part
 from lapwing.fmi.export.fmu import export_fmu
-from tests.combinations import NIGHTLY, rest_nightly
+from tests.combinations import NIGHTLY
 from tests.commands import run_command
 
 pytestmark = pytest.mark.long
@@ -98,7 +98,8 @@ def test_fmi_2_has_recorded_outputs(tmp_path: Path) -> None:
     assert np.array_equal(speeds, [recorded.latest("truth", k)[first : first + 4] for k in range(recorded.ticks)])
 
 
-@pytest.mark.parametrize("part", rest_nightly("plant", "vehicle"))
+@NIGHTLY
+@pytest.mark.parametrize("part", ["plant", "vehicle"])
 def test_library_has_recorded_outputs(part: str, tmp_path: Path) -> None:
     native, recorded = built(tmp_path, "delivery_mission", part, **SCENE, **{"multibody.event": FAILURES})
     native.compare(recorded, 0, recorded.ticks)

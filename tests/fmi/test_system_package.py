@@ -10,6 +10,7 @@ pytest.importorskip("fmpy")
 
 from fmpy.ssp.ssd import read_ssd
 
+from tests.combinations import rest_nightly
 from tests.commands import assert_rejected, run_command
 
 pytestmark = pytest.mark.long
@@ -150,7 +151,7 @@ def test_fmpy_flies_package(folder: Path) -> None:
 
 @pytest.mark.parametrize(
     ("changes", "message"),
-    [
+    rest_nightly(
         ([('version="2.0"', 'version="3.0"')], "SSP version 3.0; expected version 1.0 or 2.0"),
         ([foreign("plant"), foreign("trajectory"), foreign("autopilot")], "has no Lapwing part"),
         ([('source="resources/plant.fmu"', 'source="resources/wing.fmu"'), foreign("plant")], "no file resources/wing"),
@@ -173,7 +174,8 @@ def test_fmpy_flies_package(folder: Path) -> None:
         ),
         ([('name="plant" />', 'name="plant" ')], "SystemStructure.ssd is not XML"),
         ([("<ssd:System name", "<!DOCTYPE a><ssd:System name")], "declares a document type"),
-    ],
+        keep=4,
+    ),
 )
 def test_invalid_package_is_one_line(folder: Path, tmp_path: Path, changes: list, message: str) -> None:
     package = changed(folder / "hover3.ssp", tmp_path / "bad.ssp", *changes)

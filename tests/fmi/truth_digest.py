@@ -17,9 +17,9 @@ def digest_of_rows(config: RunConfig, rows: np.ndarray) -> str:
     encoder = next(w for w in create(config, "plant").encoders if w.topic.name == TRUTH.name)
     ticks = np.arange(len(rows))
     digest = Digest()
-    for page in encode(encoder, config.port(encoder.port), config, ticks, rows):
-        payloads = np.ascontiguousarray(page.payloads).view(np.uint8).reshape(len(ticks), -1)
-        digest.update_page(TRUTH.name, page.ticks * config.interval_ns, payloads)
+    for batch in encode(encoder, config.port(encoder.port), config, ticks, rows):
+        payloads = np.ascontiguousarray(batch.payloads).view(np.uint8).reshape(len(ticks), -1)
+        digest.update_batch(TRUTH.name, batch.ticks * config.interval_ns, payloads)
     return digest.hexdigest()
 
 

@@ -1,9 +1,12 @@
 """Functions compiled from text: equal in Python and compiled code, one for each combination of argument types."""
 
+from typing import NamedTuple
+
+import pytest
 from numba.core import types
 
-from lapwing.kernels import always_inline, kernel
-from lapwing.kernels.codegen import compile_source, generic, map_index, map_tuple, reduce_tuple
+from lapwing.kernels import DispatchTable, always_inline, kernel
+from lapwing.kernels.codegen import compile_source, dispatch, generic, map_index, map_tuple, reduce_tuple
 
 
 @always_inline
@@ -50,3 +53,44 @@ def folded(x, y):
 def test_reduce_tuple_keeps_order():
     x, y = (1.0, 2.0, 3.0), (1.0, 1.0, 2.0)
     assert folded(x, y) == folded.py_func(x, y) == 1126.0
+
+
+class Spring(NamedTuple):
+    stiffness: float
+
+
+class Cable(NamedTuple):
+    force: float
+
+
+@always_inline
+def pull(p, x):
+    return p.stiffness * x
+
+
+@always_inline
+def constant(p, x):
+    return p.force
+
+
+PULLS = DispatchTable("pull")
+PULLS[Cable] = constant
+pull_of = dispatch(PULLS)
+
+
+@kernel
+def pulls(spring, cable, x):
+    return pull_of(spring, x), pull_of(cable, x)
+
+
+def test_function_of_module_is_called_for_class_without_entry():
+    arguments = Spring(3.0), Cable(5.0), 2.0
+    assert pulls(*arguments) == pulls.py_func(*arguments) == (6.0, 5.0)
+
+
+def test_class_without_function_has_no_entry():
+    missing = DispatchTable("push")
+    assert missing.get(Spring) is None
+    assert Spring not in PULLS
+    with pytest.raises(KeyError, match="test_codegen has no push"):
+        missing[Spring]

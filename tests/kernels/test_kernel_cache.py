@@ -9,6 +9,8 @@ import time
 
 import pytest
 
+from tests.combinations import rest_nightly
+
 pytestmark = pytest.mark.long
 
 OUTER = "from plant.outer import outer; values['outer'] = outer(3.0)"
@@ -57,15 +59,14 @@ def test_loaded_kernel_hashes_texts_like_python(package):
 
 @pytest.mark.parametrize(
     ("statements", "file", "old", "new", "after"),
-    [
+    rest_nightly(
         (OUTER, "plant/outer.py", "1.0", "4.0", {"outer": 10.0}),
         (OUTER, "plant/inner.py", "GAIN * x", "GAIN - x", {"outer": 0.0}),
         (OUTER, "plant/constants.py", "2.0", "5.0", {"outer": 16.0}),
         (OUTER, "plant/__init__.py", "pass", "from plant import constants\nconstants.GAIN = 7.0", {"outer": 22.0}),
         (TOTAL, "plant/law.py", "10.0", "20.0", {"total": 60.0}),
         (TOTAL, "plant/spring.py", "stiffness: float", "stiffness: float = 0.0", {"total": 30.0}),
-        (PRODUCT, "plant/inner.py", "GAIN * x", "GAIN - x", {"product": [2.0, 5.0]}),
-    ],
+        (PRODUCT, "plant/inner.py", "GAIN * x", "GAIN - x", {"product": [2.0, 5.0]}), keep=4,),
 )  # fmt: skip
 def test_edit_of_reachable_source_recompiles(package, statements, file, old, new, after):
     package.run(statements)

@@ -15,6 +15,7 @@ from lapwing.runs import precompile
 from lapwing.runs.observer import Compilation, notify_on_compile
 from lapwing.runs.precompile import compile_ahead
 from lapwing.services.scene_resolver import load, resolve
+from lapwing.studies.workers import run_here
 
 SERVICES = ("plant", "autopilot", "trajectory")  # of the hover scene
 
@@ -74,17 +75,32 @@ def test_terminal_has_bar_and_other_streams_have_line():
 def test_precompile_shows_bar_or_one_line_per_scene(config, monkeypatch, terminal):
     monkeypatch.setattr(precompile, "BlockDiagram", Compiling)
     console = Console(file=io.StringIO(), force_terminal=terminal, width=100, markup=False)
-    compile_ahead({"one": config, "two": config}, console)
+    compile_ahead({"one": config, "two": config}, console, run_here)
     output = console.file.getvalue()
     assert output.count("ready after") == 2
-    assert ("0 of 2 scenes  one" in output) == terminal
-    assert ("hover: compiling kernels of plant, autopilot, trajectory (cached" in output) == (not terminal)
-    assert "about" not in output
+    assert ("kernels of 6 of 6 services  hover " in output) == terminal
+    assert len(output.splitlines()) == 2 or terminal
+
+
+def test_precompile_begins_with_plant_and_compiles_each_service_once(config, monkeypatch):
+    tasks = []
+
+    def workers(call, given):
+        assert call is precompile.compile_service
+        tasks.extend(name for _, name in given)
+        return iter(())
+
+    monkeypatch.setattr(precompile, "BlockDiagram", Compiling)
+    compile_ahead({"one": config}, Console(file=io.StringIO()), workers)
+    assert tasks[0] == "plant"
+    assert sorted(tasks) == sorted(SERVICES)
 
 
 def test_broken_scene_of_folder_does_not_stop_others(tmp_path, monkeypatch):
     compiled = []
-    monkeypatch.setattr("lapwing.runs.precompile.compile_ahead", lambda configs, console: compiled.extend(configs))
+    monkeypatch.setattr(
+        "lapwing.runs.precompile.compile_ahead", lambda configs, console, workers: compiled.extend(configs)
+    )
     for name in ("a", "c"):
         (tmp_path / f"{name}.toml").write_text("[run")
     (tmp_path / "b.toml").write_bytes(Path("lapwing/scenes/hover.toml").read_bytes())

@@ -122,19 +122,19 @@ def test_batch_digest_equals_message_digests(n):
     rng = np.random.default_rng(n)
     times = rng.integers(-5, 1 << 60, n)
     payloads = rng.integers(0, 256, (n, 37), dtype=np.uint8)
-    one, page = Digest(), Digest()
-    for digest_ in (one, page):
+    one, batch = Digest(), Digest()
+    for digest_ in (one, batch):
         digest_.update("/b", 1, b"before")
     for time_ns, payload in zip(times.tolist(), payloads, strict=True):
         one.update("/a", time_ns, payload.tobytes())
         one.update("/b", time_ns, payload.tobytes())
-    page.update_page("/a", times, payloads)
-    page.update_page("/b", times, payloads)
-    for digest_ in (one, page):
+    batch.update_batch("/a", times, payloads)
+    batch.update_batch("/b", times, payloads)
+    for digest_ in (one, batch):
         digest_.update("/b", 2, b"behind")
-    assert one.hexdigest() == page.hexdigest()
+    assert one.hexdigest() == batch.hexdigest()
 
 
-def test_page_needs_time_for_each_payload():
+def test_batch_needs_time_for_each_payload():
     with pytest.raises(ValueError, match="/a: 2 times for 3 payloads"):
-        Digest().update_page("/a", np.zeros(2, np.int64), np.zeros((3, 8), np.uint8))
+        Digest().update_batch("/a", np.zeros(2, np.int64), np.zeros((3, 8), np.uint8))

@@ -10,7 +10,7 @@ from samples import flat, sample, value, varied
 
 from lapwing.messages import TYPES, BatteryState, Estimate, Imu, RotorWrench, Status, Vector3, header, stamp_ns
 from lapwing.messages import topic_columns as module
-from lapwing.messages.topic_columns import ColumnBuilder, history, history_of_pages
+from lapwing.messages.topic_columns import ColumnBuilder, history, history_of_batches
 
 
 @pytest.mark.parametrize("name", TYPES)
@@ -84,22 +84,22 @@ def test_damaged_messages_are_rejected():
         columns["mode"]
 
 
-def test_pages_equal_payloads():
+def test_batches_equal_payloads():
     messages = [
         Status(mode=mode, arming_blockers=why) for mode, why in [("a", ()), ("b", ("x",)), ("c", ()), ("d", ("y",))]
     ]
     payloads = [message.encode() for message in messages]
     expected = history(Status, payloads)
 
-    def page(*indices):
+    def batch(*indices):
         return np.array(indices), np.stack([np.frombuffer(payloads[k], np.uint8) for k in indices])
 
-    result = history_of_pages(Status, [page(0, 2), page(3), page(1)])
+    result = history_of_batches(Status, [batch(0, 2), batch(3), batch(1)])
     assert list(result) == list(expected)
     for name, column in expected.items():
         assert result[name] == column if isinstance(column, list) else np.array_equal(result[name], column), name
     assert result.payloads() == expected.payloads() == payloads
-    assert list(history_of_pages(Status, [])) == list(history(Status, []))
+    assert list(history_of_batches(Status, [])) == list(history(Status, []))
 
 
 def test_history_can_be_pickled():
@@ -109,8 +109,8 @@ def test_history_can_be_pickled():
 
 @pytest.mark.parametrize("count", [0, 1, 7, 8, 9, 30])
 def test_incremental_columns_equal_complete_columns(monkeypatch, count):
-    """Compare columns of pages of eight messages, with two shapes and texts."""
-    monkeypatch.setattr(module, "PAGE", 8)
+    """Compare columns of batches of eight messages, with two shapes and texts."""
+    monkeypatch.setattr(module, "BATCH", 8)
     output = [Status(header(k, "body"), phase="up" if k % 5 else "over there", armed=k > 3) for k in range(count)]
     payloads, gathered = [message.encode() for message in output], ColumnBuilder(Status)
     for k, payload in enumerate(payloads):

@@ -49,7 +49,7 @@ def tripod():
     """Return a swinging system of three quadrotors whose links span space."""
     spread = [(0.5 * math.cos(a), 0.5 * math.sin(a), -math.sqrt(0.75)) for a in (0.0, 2.1, 4.2)]
     p, _ = published()
-    law = p.drive._replace(direction=tuple(spread))
+    law = p.control._replace(direction=tuple(spread))
     p = CooperativeLoadParameters((0.755, 0.9, 0.6), (INERTIA,) * 3, (0.6, 0.8, 1.1), 0.4, G, law)
     swings = tuple(normalise(Swing((q[0] + 0.1, q[1] - 0.05, q[2]), (0.4, -0.2, 0.3))) for q in spread)
     return p, CooperativeLoadState(
@@ -60,7 +60,7 @@ def tripod():
 def test_desired_path_equals_published_path():
     p, _ = published()
     for t in (0.0, 1.3, 5.0):
-        position, velocity, acceleration = forces_of.desired_load(p.drive.path, t)
+        position, velocity, acceleration = forces_of.desired_load(p.control.path, t)
         assert position == pytest.approx((t - 2.5, 0.0, -((t - 2.5) ** 2 - 7.0)), abs=1e-14)
         assert velocity == pytest.approx((1.0, 0.0, -2 * (t - 2.5)), abs=1e-14)
         assert acceleration == (0.0, 0.0, -2.0)
@@ -82,7 +82,7 @@ def test_desired_forces_produce_desired_motion():
     assert specific == pytest.approx(expected, abs=0.03 * max(map(abs, expected)))
     for i in range(3):
         q, omega = x.link[i].direction, x.link[i].omega
-        swing = -16.0 * np.cross(p.drive.direction[i], q) - 5.0 * np.array(omega)
+        swing = -16.0 * np.cross(p.control.direction[i], q) - 5.0 * np.array(omega)
         exact = np.array(swing) + np.cross(q, np.array(specific) - expected) / p.link_length[i]
         assert link_acceleration(p, x, force, specific, i) == pytest.approx(exact, abs=1e-12)
 
@@ -148,7 +148,7 @@ def test_published_flight_reaches_path_formation_and_attitude():
     _, rows = simulate(get("rkmk4"), p, x0, 5.0 / 2000, 2000, every=1000)
     for t, row in zip((2.5, 5.0), rows[1:], strict=True):
         now = unflatten(x0, tuple(map(float, row)))
-        position, velocity, _ = forces_of.desired_load(p.drive.path, t)
+        position, velocity, _ = forces_of.desired_load(p.control.path, t)
         assert now.load_position == pytest.approx(position, abs=5e-3)
         assert now.load_velocity == pytest.approx(velocity, abs=5e-2)
         for i, angle in enumerate((30.0, -30.0)):

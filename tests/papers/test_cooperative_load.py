@@ -47,8 +47,8 @@ def swinging(n, seed=0):
     )
 
 
-def system(n, drive):
-    return CooperativeLoadParameters((0.755, 0.9, 0.6)[:n], (INERTIA,) * n, (0.6, 0.8, 1.1)[:n], 0.4, G, drive)
+def system(n, control):
+    return CooperativeLoadParameters((0.755, 0.9, 0.6)[:n], (INERTIA,) * n, (0.6, 0.8, 1.1)[:n], 0.4, G, control)
 
 
 def pushing(n):
@@ -63,7 +63,7 @@ def constrained_accelerations(p, x):
     force = [np.array((0, 0, -p.load_mass * p.gravity))]
     jacobian, right = np.zeros((n, 3 * n + 3)), np.zeros(n)
     for i in range(n):
-        thrust = np.array(rotation_matrix(x.attitude[i])).reshape(3, 3)[:, 2] * p.drive.thrust[i]
+        thrust = np.array(rotation_matrix(x.attitude[i])).reshape(3, 3)[:, 2] * p.control.thrust[i]
         force.append(thrust - np.array((0, 0, p.quad_mass[i] * p.gravity)))
         d = np.array(quad_position(p, x, i)) - y
         dv = np.array(quad_velocity(p, x, i)) - v
@@ -104,14 +104,14 @@ def test_whole_flight_agrees_with_constrained_formulation():
         force, jacobian, right = np.zeros((3, 3)), np.zeros((2, 9)), np.zeros(2)
         force[:, 2] = -mass[::3] * p.gravity
         for i in range(2):
-            force[i + 1] += m[i][:, 2] * p.drive.thrust[i]
+            force[i + 1] += m[i][:, 2] * p.control.thrust[i]
             d, dv = r[i + 1] - r[0], v[i + 1] - v[0]
             jacobian[i, :3], jacobian[i, 3 + 3 * i : 6 + 3 * i] = -d, d
             right[i] = -dv @ dv
         saddle = np.block([[np.diag(mass), jacobian.T], [jacobian, np.zeros((2, 2))]])
         a = np.linalg.solve(saddle, np.concatenate([force.ravel(), right]))[:9]
         turning = [m[i] @ np.cross(np.eye(3), o[i]) for i in range(2)]
-        angular = [(p.drive.moment_body[i] - np.cross(o[i], INERTIA * o[i])) / INERTIA for i in range(2)]
+        angular = [(p.control.moment_body[i] - np.cross(o[i], INERTIA * o[i])) / INERTIA for i in range(2)]
         return np.concatenate([v.ravel(), a, np.ravel(turning), np.ravel(angular)])
 
     other = solve_ivp(right_hand_side, (0, 1), y0, method="DOP853", rtol=1e-11, atol=1e-11).y[:, -1]

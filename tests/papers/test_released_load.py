@@ -20,8 +20,8 @@ INERTIA, MOMENT, SPIN = (0.08, 0.09, 0.13), (0.0, 0.0, 0.02), (0.0, 0.0, 0.3)
 
 def let_go():
     """Return a release with both quadrotors in rotation about their axes, the second tilted by 90 degrees about x."""
-    drive = LiftCommand((THRUST, THRUST), (MOMENT, MOMENT))
-    p = CooperativeLoadParameters((MASS, MASS), (INERTIA, INERTIA), (0.6, 0.8), 0.4, G, drive)
+    control = LiftCommand((THRUST, THRUST), (MOMENT, MOMENT))
+    p = CooperativeLoadParameters((MASS, MASS), (INERTIA, INERTIA), (0.6, 0.8), 0.4, G, control)
     links = (Swing((0.0, 0.0, -1.0), (2.0, 0.0, 0.0)), Swing((1.0, 0.0, 0.0), (0.0, 0.0, 3.0)))
     tilted = exp((np.pi / 2, 0.0, 0.0))
     return release(p, CooperativeLoadState((1.0, 2.0, 3.0), (0.1, 0.2, 0.3), (NO_ROTATION, tilted), (SPIN,) * 2, links))

@@ -81,7 +81,7 @@ class BlockDiagram(PortRows):
         config: RunConfig,
         services: Sequence[Service],
         kept_ticks: int,
-        whole: Collection[str] = (),
+        full_history: Collection[str] = (),
         rows: dict[str, np.ndarray] | None = None,
     ):
         """Bind services, in their order of execution.
@@ -90,7 +90,7 @@ class BlockDiagram(PortRows):
             config: run configuration.
             services: all services of the run, or one.
             kept_ticks: number of most recent ticks whose rows are kept.
-            whole: names of the ports with full history.
+            full_history: names of the ports with all their samples.
             rows: rows of a diagram that is no longer needed; their memory is reused if the shape is equal.
         """
         self.config, self.services = config, services
@@ -111,7 +111,8 @@ class BlockDiagram(PortRows):
         for encoder in (encoder for service in services for encoder in service.encoders if encoder.on_change):
             delays[encoder.port] = max(delays.get(encoder.port, 0), 1)
         depths = {
-            name: config.last_tick + 1 if name in whole else kept_ticks + delays.get(name, 0) for name in port_names
+            name: config.last_tick + 1 if name in full_history else kept_ticks + delays.get(name, 0)
+            for name in port_names
         }
         super().__init__(ports, depths, delays, rows)
         self._blocks = blocks

@@ -9,7 +9,6 @@ blocks of one service may share. Every block is compiled once, to a function of 
 the same machine code by its address, so the results of all executors are bit-for-bit identical.
 """
 
-import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -20,9 +19,9 @@ import numpy as np
 from numba import types
 
 from lapwing.cosim.diagram.tick_schedule import LATCHED, InputPort, Port, due
-from lapwing.kernels import always_inline, kernel, no_refcount
+from lapwing.kernels import DispatchTable, always_inline, kernel, no_refcount
 from lapwing.kernels.cell import Cell
-from lapwing.kernels.codegen import compile_source, generic
+from lapwing.kernels.codegen import compile_source, dispatch, generic
 from lapwing.kernels.row_packing import load, store
 
 CONTINUE, WAKE_PYTHON, FINISHED, NON_FINITE = range(4)
@@ -119,10 +118,7 @@ def _address(cell: types.Type, trusted: bool) -> int:
     return compiled.library.get_pointer_to_function(compiled.fndesc.llvm_cfunc_wrapper_name)
 
 
-@generic(inline=True)
-def step(parameters: types.Type, state: types.Type, tick: types.Type, inputs: types.Type) -> Any:
-    """Call `step` of the module that declares the class of the parameters."""
-    return sys.modules[parameters.instance_class.__module__].step
+step = dispatch(DispatchTable("step"))
 
 
 @always_inline

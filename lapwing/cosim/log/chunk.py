@@ -139,7 +139,7 @@ def add_to_digest(digest: Digest, parts: list[Rows]) -> None:
         if len({part.records.itemsize for part in of_topic}) == 1:
             order = np.concatenate([part.order for part in of_topic])
             records = np.concatenate([part.records for part in of_topic])[np.argsort(order, kind="stable")]
-            digest.update_page(topic.name, records["log_time"].astype(np.int64), records["payload"])
+            digest.update_batch(topic.name, records["log_time"].astype(np.int64), records["payload"])
             continue
         entries: list[tuple[int, int, bytes]] = []
         for part, places in zip(of_topic, _places(of_topic), strict=True):

@@ -19,7 +19,7 @@ CHUNK_SIZE = 512 * 1024  # [bytes] limit of single messages in a chunk
 FLUSH_PERIOD = 0.5  # [s] of wall time
 
 Part = tuple[str, Any, np.ndarray, np.ndarray, np.ndarray]
-"""Messages of a page: topic, message class, times [ns] (n,), payloads (n, size) uint8 or (n,) records, order (n,)."""
+"""Messages of a batch: topic, message class, times [ns] (n,), payloads (n, size) uint8 or (n,) records, order (n,)."""
 
 
 class LogWriter:

@@ -11,6 +11,7 @@ hypervisor runs other machines (`/proc/stat`, `steal`).
 
 import os
 import time
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
 from pathlib import Path
@@ -21,25 +22,28 @@ PROCESSORS = Path("/proc/stat")
 STEAL = 8  # word of the first line of `PROCESSORS`
 
 
-def starved_time(pid: int) -> float:
-    """Return the time [s] that the threads of a process have waited for a processor; 0 if the system has no count."""
-    return _scheduled(pid)[1]
+def starved_times(pid: int) -> Counter[int]:
+    """Return for each thread of a process the time [ns] that it has waited for a processor; empty without a count."""
+    return _scheduled(pid, 1)
 
 
-def cpu_time(pid: int) -> float:
-    """Return the time [s] that the threads of a process have run; 0 if the system has no count."""
-    return _scheduled(pid)[0]
+def cpu_times(pid: int) -> Counter[int]:
+    """Return for each thread of a process the time [ns] that it has run; empty if the system has no count."""
+    return _scheduled(pid, 0)
 
 
-def _scheduled(pid: int) -> tuple[float, float]:
-    run = wait = 0
-    try:
+def _scheduled(pid: int, column: int) -> Counter[int]:
+    result = Counter[int]()
+    with suppress(OSError):  # it has ended, or the system has no such folder
         for thread in Path(f"/proc/{pid}/task").iterdir():
-            counts = (thread / "schedstat").read_text().split()
-            run, wait = run + int(counts[0]), wait + int(counts[1])
-    except (OSError, IndexError, ValueError):  # it has ended, or the system has no such file
-        return 0.0, 0.0
-    return run * 1e-9, wait * 1e-9
+            with suppress(OSError, IndexError, ValueError):  # it has ended
+                result[int(thread.name)] = int((thread / "schedstat").read_text().split()[column])
+    return result
+
+
+def growth(now: Counter[int], before: Counter[int]) -> float:
+    """Return the growth [s] of the times of all threads; one that has ended takes nothing from the others."""
+    return 1e-9 * (now - before).total()
 
 
 def machine_stall_time() -> float:
@@ -60,8 +64,8 @@ class Starvation:
     """Waiting time and run time of local processes since the last message."""
 
     def __init__(self) -> None:
-        self._before: dict[str, float] = {}  # [s] waiting time by name
-        self._run_before: dict[str, float] = {}  # [s] run time by name
+        self._before: dict[str, Counter[int]] = {}  # waiting times by name
+        self._run_before: dict[str, Counter[int]] = {}  # run times by name
         self._stall_before = 0.0  # [s] stall time of the machine
         self._pids: Mapping[str, int] = {}
 
@@ -71,23 +75,24 @@ class Starvation:
         if silence < QUIET:
             self._before = {}
         elif not self._before:
-            self._before = {name: starved_time(pid) for name, pid in pids.items()}
-            self._run_before = {name: cpu_time(pid) for name, pid in pids.items()}
+            self._before = {name: starved_times(pid) for name, pid in pids.items()}
+            self._run_before = {name: cpu_times(pid) for name, pid in pids.items()}
             self._stall_before = machine_stall_time()
 
     def of(self, names: Iterable[str]) -> float:
         """Return the total waiting time [s] of the named processes since the last message, and that of the machine."""
         if not self._before:
             return 0.0
-        return self._total(starved_time, self._before, names) + machine_stall_time() - self._stall_before
+        return self._total(starved_times, self._before, names) + machine_stall_time() - self._stall_before
 
     def run_time(self, names: Iterable[str]) -> float:
         """Return the total run time [s] of the named processes since the last message."""
-        return self._total(cpu_time, self._run_before, names)
+        return self._total(cpu_times, self._run_before, names)
 
-    def _total(self, time: Callable[[int], float], before: Mapping[str, float], names: Iterable[str]) -> float:
-        measured = [name for name in names if name in self._before]
-        return sum(max(0.0, time(self._pids[name]) - before[name]) for name in measured)
+    def _total(
+        self, times: Callable[[int], Counter[int]], before: Mapping[str, Counter[int]], names: Iterable[str]
+    ) -> float:
+        return sum(growth(times(self._pids[name]), before[name]) for name in names if name in before)
 
 
 EXTENSION = 6.0  # limit of an extended time-out, as its multiple
@@ -127,7 +132,7 @@ class Patience:
     def restart(self) -> None:
         """Start the time-out again."""
         self._start = self._clock()
-        self._before: dict[int, float] = {}
+        self._before: dict[int, Counter[int]] = {}
         self._stall_before = 0.0
 
     @property
@@ -138,11 +143,11 @@ class Patience:
             self.restart()
             return False
         if elapsed > 0.5 * self.timeout and not self._before:  # reading it takes time, and most waits are short
-            self._before = {pid: starved_time(pid) for pid in self._pids}
+            self._before = {pid: starved_times(pid) for pid in self._pids}
             self._stall_before = machine_stall_time()
         if elapsed <= self.timeout:
             return False
-        starved = sum(max(0.0, starved_time(pid) - before) for pid, before in self._before.items())
+        starved = sum(growth(starved_times(pid), before) for pid, before in self._before.items())
         starved += machine_stall_time() - self._stall_before
         return elapsed > self._longest or elapsed - starved > self.timeout
 

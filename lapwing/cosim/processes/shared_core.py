@@ -124,7 +124,7 @@ def process_tree(thread: int) -> list[int]:
 def total_cpu_time(pid: int) -> float:
     """Return the CPU time [s] of a process with its ended threads, 0 if the system does not report it.
 
-    `cpu_starvation.cpu_time` is finer, but a thread that ends takes its time along.
+    `patience.cpu_times` is finer, but a thread that ends takes its time along.
     """
     try:
         fields = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()

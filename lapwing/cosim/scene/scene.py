@@ -6,21 +6,16 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, ClassVar, NamedTuple, TypeVar
 
-from pydantic import BaseModel, ConfigDict
-
 from lapwing.cosim.scene.files import Files
 from lapwing.cosim.scene.overrides import Override
 from lapwing.cosim.scene.scene_error import KeyOrigin, SceneError
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.validation import Table
 
 
-class SceneTable(BaseModel):
-    """Table of a scene. Subclasses set `TABLE`, the name of the table.
+class SceneTable(Table):
+    """Table of a scene. Subclasses set `TABLE`, the name of the table."""
 
-    Validation is strict: TOML has types, so a number in quotes or `true` for 1.0 is an error.
-    """
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
     TABLE: ClassVar[str]
     OPTIONAL: ClassVar[bool] = False  # True if a scene may omit it; see `Scene.has`
     FROM_FILE: ClassVar[bool] = False  # True if its content is that of a file that another table names

@@ -205,8 +205,8 @@ class PacketSender:
     def _publish_log(self, stop: int) -> None:
         self._log_due = time.monotonic() + LOG_PERIOD
         if stop > self._logged:
-            pages = self._diagram.record_batches(self._logged, stop)
-            self._put_log(pack_log_packet(pages, self._logged, stop), (stop - 1) * self._interval_ns)
+            batches = self._diagram.record_batches(self._logged, stop)
+            self._put_log(pack_log_packet(batches, self._logged, stop), (stop - 1) * self._interval_ns)
             self._logged = stop
 
     def end(self, stop: int) -> None:

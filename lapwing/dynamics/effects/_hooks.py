@@ -11,8 +11,8 @@ Hooks of one evaluation, in order:
     air_rate             (e, memory, s, rate_body) -> rate_body      [rad/s] rotation of the air
     load_factors         (e, memory, s, factors) -> Factors          on thrust and torque of each rotor
     loads                (e, memory, s, factors, loads) -> Loads     thrust and torque of each rotor, added to loads
-    terminal_voltage     (e, memory, power) -> voltage [V] of the battery under a power [W]; one effect only
-    battery_state        (e, memory, power) -> (charge, voltage [V], current [A], temperature [K]); NaN: not modelled
+    battery              (e, memory, power) -> (voltage [V] for the motors under a power [W], its state: (charge,
+                         terminal voltage [V], current [A], temperature [K]; NaN: not modelled)); one effect only
     motor                (e, memory, s, loads, voltage) -> (acceleration, current, power) of each rotor; one effect only
     wrench               (e, memory, s, rotors) -> (force_world [N], torque_body [N m]) at the centre of mass
     wrench_body          (e, memory, s, rotors) -> (force_body [N], torque_body [N m])
@@ -31,8 +31,8 @@ Hooks between evaluations:
     wrench_and_rate      (e, memory, motion) -> (force_world, torque_body, rate of its memory)    of a stiff effect
                          whose memory is integrated with the motion; the force is that of its wrench
     memory_rate          (e, memory, s, rotors) -> rate of its memory, which is integrated with the motion in every step
-    decay_rate           (e, memory, layout) -> [1/s] bound of the rate at which that memory decays, for stability
-    damping_rate         (e, memory, motion, body) -> [1/s] bound of the rate at which it damps the motion
+    decay_rate           (e, memory, motion, body, layout) -> [1/s] bound of the rate at which it damps the motion, or
+                         at which that memory decays, for stability
     switches             (e, memory, s, voltage, h) -> bool          True if loads or motors can jump or have a kink in
                          the next h [s], at a moment that depends on the motion; voltage as of `motor`
     timed_update         (e, memory, t) -> memory                    of an effect that changes at a given moment
@@ -82,8 +82,7 @@ air = _hook("air")
 air_rate = _hook("air_rate")
 load_factors = _hook("load_factors")
 loads = _hook("loads")
-terminal_voltage = _hook("terminal_voltage")
-battery_state = _hook("battery_state")
+battery = _hook("battery")
 motor = _hook("motor")
 wrench = _hook("wrench")
 wrench_body = _hook("wrench_body")
@@ -95,7 +94,6 @@ break_time = _hook("break_time")
 wrench_and_rate = _hook("wrench_and_rate")
 memory_rate = _hook("memory_rate")
 decay_rate = _hook("decay_rate")
-damping_rate = _hook("damping_rate")
 substeps = _hook("substeps")
 contact = _hook("contact")
 contact_forces = _hook("contact_forces")
@@ -120,8 +118,8 @@ def initial_battery_state(effects: tuple, memory: tuple, voltage: float) -> tupl
     """
     result = (math.nan, voltage, 0.0, math.nan)
     for e, own in zip(effects, memory, strict=True):
-        if type(e) in HOOKS["battery_state"]:
-            result = python_function(HOOKS["battery_state"][type(e)])(e, own, 0.0)
+        if type(e) in HOOKS["battery"]:
+            result = python_function(HOOKS["battery"][type(e)])(e, own, 0.0)[1]
     return result
 
 
@@ -222,13 +220,13 @@ all_fields = _generate_calls(
     "all_fields", "field", "value", "value = add(value, f{i}(effects[{i}], memory[{i}]))", "value"
 )
 all_motors = _combine("all_motors", "motor", "s, loads, voltage", "{call}", "default", "default")
-all_battery_states = _combine("all_battery_states", "battery_state", "power", "{call}", "default", "default")
-battery_voltage = _combine("battery_voltage", "terminal_voltage", "power", "{call}", "math.inf")
+_READ = "read = f{i}(effects[{i}], memory[{i}], power)"
+battery_voltage = _generate_calls("battery_voltage", "battery", "power", _READ, "read[0]", default="math.inf")
+battery_state = _generate_calls("battery_state", "battery", "power, default", _READ, "read[1]", default="default")
 all_discrete_updates = _update("all_discrete_updates", "discrete_update", "s, rotors, key, tick, interval")
 all_timed_updates = _update("all_timed_updates", "timed_update", "t")
 all_substeps = _combine("all_substeps", "substeps", "motion, h", "max(value, {call})", "1")
-all_decay_rates = _combine("all_decay_rates", "decay_rate", "layout", "max(value, {call})", "0.0")
-all_damping_rates = _combine("all_damping_rates", "damping_rate", "motion, body", "max(value, {call})", "0.0")
+all_decay_rates = _combine("all_decay_rates", "decay_rate", "motion, body, layout", "max(value, {call})", "0.0")
 all_contacts = _combine("all_contacts", "contact", "s", "value or {call}", "False")
 all_contact_forces = _combine("all_contact_forces", "contact_forces", "motion", "value + {call}", "()")
 all_switches = _combine("all_switches", "switches", "s, voltage, h", "value or {call}", "False")

@@ -6,7 +6,7 @@ from annotated_types import Ge, Gt, Le
 
 from lapwing.dynamics.effects._external_inputs import external, initial_state, input_or
 from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
-from lapwing.dynamics.effects._hooks import battery_state, discrete_update, memory_rate, terminal_voltage
+from lapwing.dynamics.effects._hooks import battery, discrete_update, memory_rate
 from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.kernels import always_inline, math
 
@@ -91,8 +91,8 @@ def current_of(voltage, power):
     return power / voltage if voltage > 0.0 else 0.0
 
 
-@terminal_voltage(Battery)
-def battery(e, memory, power):
+@always_inline
+def _voltage(e, memory, power):
     """Return the voltage [V] under a power [W]; zero after the cut-off."""
     charge, on = memory
     return under_load(e.cells * open_circuit_voltage(charge), e.resistance, power) if on > 0.0 else 0.0
@@ -102,7 +102,7 @@ def battery(e, memory, power):
 def discharge(e, memory, s, rotors):
     """Return the rates of charge [1/s] and switch."""
     power = total(rotors.power)
-    return _discharge(e, memory[0], current_of(battery(e, memory, power), power))
+    return _discharge(e, memory[0], current_of(_voltage(e, memory, power), power))
 
 
 @always_inline
@@ -114,14 +114,14 @@ def _discharge(e, charge, current):
 def cut_off(e, memory, s, rotors, key, tick, interval):
     """Return the discrete state with the battery off for good if its voltage is too low."""
     charge, _ = memory
-    return (charge, 1.0 if battery(e, memory, total(rotors.power)) > e.cutoff_voltage else 0.0)
+    return (charge, 1.0 if _voltage(e, memory, total(rotors.power)) > e.cutoff_voltage else 0.0)
 
 
-@battery_state(Battery)
+@battery(Battery)
 def read(e, memory, power):
-    """Return charge, voltage [V] under load, current [A]; no temperature."""
-    voltage = battery(e, memory, power)
-    return max(memory[0], 0.0), voltage, current_of(voltage, power), math.nan
+    """Return the voltage [V] under a power [W], and (charge, voltage, current [A], no temperature)."""
+    voltage = _voltage(e, memory, power)
+    return voltage, (max(memory[0], 0.0), voltage, current_of(voltage, power), math.nan)
 
 
 @always_inline
@@ -131,29 +131,29 @@ def _with_charge(memory):
     return input_or(charge, inputs.charge), on
 
 
-@terminal_voltage(ExternalBattery)
-def external_battery(e, memory, power):
+@always_inline
+def _external_voltage(e, memory, power):
     """Return the voltage [V] under a power [W], or that of the inputs; zero after the cut-off."""
     own, inputs = _with_charge(memory), memory[1]
-    return input_or(battery(e.own, own, power), inputs.voltage) if own[1] > 0.0 else 0.0
+    return input_or(_voltage(e.own, own, power), inputs.voltage) if own[1] > 0.0 else 0.0
 
 
 @memory_rate(ExternalBattery)
 def discharge_external(e, memory, s, rotors):
     """Return the rates of the battery's own charge [1/s] and switch."""
     power = total(rotors.power)
-    return _discharge(e.own, memory[0][0], current_of(external_battery(e, memory, power), power))
+    return _discharge(e.own, memory[0][0], current_of(_external_voltage(e, memory, power), power))
 
 
 @discrete_update(ExternalBattery)
 def cut_off_external(e, memory, s, rotors, key, tick, interval):
     """Return the discrete state with the inputs' charge, and off for good if the voltage is too low."""
-    is_on = external_battery(e, memory, total(rotors.power)) > e.own.cutoff_voltage
+    is_on = _external_voltage(e, memory, total(rotors.power)) > e.own.cutoff_voltage
     return (_with_charge(memory)[0], 1.0 if is_on else 0.0), memory[1]
 
 
-@battery_state(ExternalBattery)
+@battery(ExternalBattery)
 def read_external(e, memory, power):
-    """Return charge, voltage [V] under load, current [A]; no temperature."""
-    voltage = external_battery(e, memory, power)
-    return max(_with_charge(memory)[0], 0.0), voltage, current_of(voltage, power), math.nan
+    """Return the voltage [V] under a power [W], and (charge, voltage, current [A], no temperature)."""
+    voltage = _external_voltage(e, memory, power)
+    return voltage, (max(_with_charge(memory)[0], 0.0), voltage, current_of(voltage, power), math.nan)

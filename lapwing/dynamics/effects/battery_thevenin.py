@@ -8,7 +8,7 @@ from lapwing.dynamics.atmosphere import temperature as air_temperature
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._external_inputs import external, initial_state, input_or
 from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
-from lapwing.dynamics.effects._hooks import battery_state, discrete_update, memory_rate, terminal_voltage
+from lapwing.dynamics.effects._hooks import battery, discrete_update, memory_rate
 from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.dynamics.effects.battery import KIND, BatteryInputs, current_of, open_circuit_voltage, under_load
 from lapwing.dynamics.environment import Environment
@@ -160,12 +160,6 @@ def _switched(e, memory, voltage):
     return charge, temperature, fast, slow, 1.0 if voltage > (e.cutoff_voltage if on > 0.0 else e.restart) else 0.0
 
 
-@terminal_voltage(BatteryThevenin)
-def battery_thevenin(e, memory, power):
-    """Return the voltage [V] for the motors under a power [W]; zero while the controllers are off."""
-    return _voltage(e, memory, power) if memory[4] > 0.0 else 0.0
-
-
 @memory_rate(BatteryThevenin)
 def discharge(e, memory, s, rotors):
     """Return the rates of the discrete state."""
@@ -179,12 +173,14 @@ def switch(e, memory, s, rotors, key, tick, interval):
     return _switched(e, memory, _voltage(e, memory, _power(memory, rotors)))
 
 
-@battery_state(BatteryThevenin)
-def read(e, memory, power):
-    """Return charge, terminal voltage [V], current [A], temperature [K]."""
-    power = power if memory[4] > 0.0 else 0.0
+@battery(BatteryThevenin)
+def battery_thevenin(e, memory, power):
+    """Return the voltage [V] for the motors, zero while the controllers are off, and the battery's state."""
+    is_on = memory[4] > 0.0
+    power = power if is_on else 0.0
     voltage = _voltage(e, memory, power)
-    return max(memory[0], 0.0), voltage, current_of(voltage, power), memory[1]
+    state = max(memory[0], 0.0), voltage, current_of(voltage, power), memory[1]
+    return voltage if is_on else 0.0, state
 
 
 @always_inline
@@ -198,12 +194,6 @@ def _with_charge(memory):
 def _external_voltage(e, memory, power):
     """Return the voltage [V] under a power [W], or that of the inputs."""
     return max(input_or(_voltage(e.own, _with_charge(memory), power), memory[1].voltage), 0.0)
-
-
-@terminal_voltage(ExternalBatteryThevenin)
-def external_battery(e, memory, power):
-    """Return the voltage [V] for the motors under a power [W]; zero while the controllers are off."""
-    return _external_voltage(e, memory, power) if memory[0][4] > 0.0 else 0.0
 
 
 @memory_rate(ExternalBatteryThevenin)
@@ -220,9 +210,11 @@ def switch_external(e, memory, s, rotors, key, tick, interval):
     return _switched(e.own, _with_charge(memory), voltage), memory[1]
 
 
-@battery_state(ExternalBatteryThevenin)
-def read_external(e, memory, power):
-    """Return charge, terminal voltage [V], current [A], temperature [K]."""
-    power = power if memory[0][4] > 0.0 else 0.0
+@battery(ExternalBatteryThevenin)
+def external_battery(e, memory, power):
+    """Return the voltage [V] for the motors, zero while the controllers are off, and the battery's state."""
+    is_on = memory[0][4] > 0.0
+    power = power if is_on else 0.0
     voltage = _external_voltage(e, memory, power)
-    return max(_with_charge(memory)[0], 0.0), voltage, current_of(voltage, power), memory[0][1]
+    state = max(_with_charge(memory)[0], 0.0), voltage, current_of(voltage, power), memory[0][1]
+    return voltage if is_on else 0.0, state

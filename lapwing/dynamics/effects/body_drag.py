@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 from annotated_types import Ge, Le
 
 from lapwing.dynamics.effects._from_scene import Airframe, reject, validate_table
-from lapwing.dynamics.effects._hooks import damping_rate, wrench_body
+from lapwing.dynamics.effects._hooks import decay_rate, wrench_body
 from lapwing.dynamics.vector import NOTHING, Vec3, apply_transposed, multiply, norm, scale, subtract
 
 Coefficient = Annotated[float, Ge(0), Le(100)]
@@ -54,8 +54,8 @@ def body_drag(e, memory, s, rotors):
     return scale(-1.0, multiply(coefficient, v_body)), NOTHING
 
 
-@damping_rate(BodyDrag)
-def rate(e, memory, motion, body):
+@decay_rate(BodyDrag)
+def rate(e, memory, motion, body, layout):
     """Return a bound of the rate [1/s] at which drag changes the velocity."""
     pressure = 2.0 * DENSEST * (norm(motion.velocity_world) + FASTEST_WIND)
     areas, linear = e.half_area, e.linear

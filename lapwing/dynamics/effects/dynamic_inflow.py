@@ -91,7 +91,7 @@ def follow(e, memory, s, rotors):
 
 
 @decay_rate(DynamicInflow)
-def fastest_approach(e, memory, layout):
+def fastest_approach(e, memory, motion, body, layout):
     """Return the rate [1/s] about the strongest thrust at full speed; the thrust falls as the flow grows."""
     speed = layout.speed_per_volt * layout.max_voltage
     hover = speed * math.sqrt(0.5 * e.slope / e.area * (1.0 - SLOWEST_FLOW) * e.pitch)

@@ -5,7 +5,7 @@ from typing import Annotated, NamedTuple
 from annotated_types import Ge, Le
 
 from lapwing.dynamics.effects._from_scene import Airframe, validate_table
-from lapwing.dynamics.effects._hooks import damping_rate, torque
+from lapwing.dynamics.effects._hooks import decay_rate, torque
 from lapwing.dynamics.vector import Vec3, multiply, scale, subtract
 
 Coefficient = Annotated[float, Ge(0), Le(1e3)]
@@ -39,8 +39,8 @@ def rotational_drag(e, memory, s, rotors):
     return scale(-1.0, multiply(e.linear, subtract(s.motion.omega_body, s.air_rate_body)))
 
 
-@damping_rate(RotationalDrag)
-def rate(e, memory, motion, body):
+@decay_rate(RotationalDrag)
+def rate(e, memory, motion, body, layout):
     """Return a bound of the rate [1/s] at which drag changes the body rates."""
     size = 0.0
     for element in body.inverse_inertia:

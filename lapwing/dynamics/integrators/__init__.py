@@ -15,6 +15,7 @@ from typing import Any
 from lapwing.dynamics import discovery
 from lapwing.dynamics.integrators._adaptive import integrate_adaptive
 from lapwing.dynamics.integrators._compensated import (
+    INCREMENTS,
     CompensatedSum,
     CompensatedSummation,
     add,
@@ -24,7 +25,7 @@ from lapwing.dynamics.integrators._compensated import (
     rounded,
     value_of,
 )
-from lapwing.dynamics.integrators._fixed_step import RATES, integrate_fixed, rate, record, step
+from lapwing.dynamics.integrators._fixed_step import RATES, STEPS, integrate_fixed, rate, record, step
 from lapwing.dynamics.integrators._pieces import BREAKPOINTS
 from lapwing.dynamics.integrators._solve import check_start, not_finite, simulate, solve
 from lapwing.dynamics.integrators._step_doubling import (
@@ -37,9 +38,11 @@ from lapwing.dynamics.integrators._step_doubling import (
 
 __all__ = [
     "BREAKPOINTS",
+    "INCREMENTS",
     "LEAST_TOLERANCE",
     "RATES",
     "SHORTEST",
+    "STEPS",
     "CompensatedSum",
     "CompensatedSummation",
     "StepDoubling",

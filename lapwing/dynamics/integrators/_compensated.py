@@ -4,14 +4,16 @@ Kahan, Comm. ACM 8 (1965) 40; Moeller, BIT 5 (1965) 37 and 251; for steps of an 
 Geometric Numerical Integration, section VIII.5.
 """
 
-import sys
 from typing import Any, NamedTuple
 
 from numba import types
 
-from lapwing.kernels import always_inline
+from lapwing.kernels import DispatchTable, always_inline
 from lapwing.kernels.codegen import generic
 from lapwing.kernels.state_tree import axpy, normalise, rounding_error, scale
+
+INCREMENTS, ORDERS = DispatchTable("increment"), DispatchTable("ORDER")
+"""`increment` and `ORDER` of a method, by its `Method`."""
 
 
 class CompensatedSummation(NamedTuple):
@@ -29,7 +31,7 @@ class CompensatedSum(NamedTuple):
 def exact(summation, method, x):
     """Return the state x as a CompensatedSum if that is the choice and the method has increments; else x."""
     chosen = getattr(summation, "instance_class", None) is CompensatedSummation
-    if chosen and hasattr(sys.modules[method.instance_class.__module__], "increment"):
+    if chosen and INCREMENTS.get(method.instance_class):
         return lambda summation, method, x: CompensatedSum(x, scale(0.0, x))
     return lambda summation, method, x: x
 
@@ -68,7 +70,7 @@ def rounded(x):
 @generic(inline=True)
 def extrapolate(method, halves, whole):
     """Return the result of two half steps without the leading term of its error (theory, eq. (2.33))."""
-    share = 1.0 / (2.0 ** sys.modules[method.instance_class.__module__].ORDER - 1.0)
+    share = 1.0 / (2.0 ** ORDERS[method.instance_class] - 1.0)
     if is_compensated(halves):
         return lambda method, halves, whole: add(halves, scale(share, difference(halves, whole)))
     return lambda method, halves, whole: normalise(axpy(share, axpy(-1.0, whole, halves), halves))

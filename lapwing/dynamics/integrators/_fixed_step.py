@@ -3,16 +3,16 @@
 A method's empty `Method` class and a system's parameter class stand for their functions: values of them can be stored.
 """
 
-import sys
 from collections import namedtuple
-from typing import Any
 
 from lapwing.kernels import DispatchTable, always_inline, kernel
-from lapwing.kernels.codegen import generic, overload_for
+from lapwing.kernels.codegen import generic
 from lapwing.kernels.state_tree import finite, flatten
 
 RATES = DispatchTable()
 """The compiled `rate(p, t, x)` of a system, by the NamedTuple class of its parameters."""
+STEPS = DispatchTable("step")
+"""The compiled `step` of a method, by its `Method`."""
 
 
 def method_token(module: str) -> type:
@@ -38,14 +38,10 @@ def rate(p, t, x):
     return _rate(p, t, x)
 
 
-def step(method: Any, p: Any, t: float, x: Any, h: float) -> Any:
+@generic()
+def step(method, p, t, x, h):
     """Return the state at t + h: one step of `method` (an instance of its module's `Method`) with parameters p."""
-    return sys.modules[type(method).__module__].step(rate, p, t, x, h)
-
-
-@overload_for(step)
-def _step(method, p, t, x, h):
-    one_step = sys.modules[method.instance_class.__module__].step
+    one_step = STEPS[method.instance_class]
     return lambda method, p, t, x, h: one_step(rate, p, t, x, h)
 
 

@@ -4,10 +4,10 @@ Steps end at the breakpoints of a system; contacts that begin and end shorten th
 """
 
 import math
-import sys
 from typing import Any, NamedTuple
 
 from lapwing.dynamics.integrators._compensated import (
+    INCREMENTS,
     CompensatedSummation,
     add,
     exact,
@@ -43,7 +43,7 @@ def shorter(substep, error, tolerance):
 def _step(method, p, t, x, h):
     if not is_compensated(x):
         return lambda method, p, t, x, h: step(method, p, t, x, h)
-    increment = sys.modules[method.instance_class.__module__].increment
+    increment = INCREMENTS[method.instance_class]
     return lambda method, p, t, x, h: add(x, increment(rate, p, t, x.value, h))
 
 

@@ -4,10 +4,11 @@ from typing import Annotated, Literal
 
 import numpy as np
 from annotated_types import Ge, Gt, Le, Len
-from pydantic import BaseModel, ConfigDict, model_validator
+from pydantic import ConfigDict, model_validator
 
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects._types import principal_moments
+from lapwing.dynamics.validation import Table
 from lapwing.kernels import math
 
 Positive = Annotated[float, Gt(0)]
@@ -18,10 +19,10 @@ PositiveTriple = tuple[Positive, Positive, Positive]
 SHORTEST_AXIS = 1e-6  # smallest length of a direction
 
 
-class Section(BaseModel):
-    """Table of an airframe file, without unknown keys and with finite numbers."""
+class Section(Table):
+    """Table of an airframe file."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+    model_config = ConfigDict(strict=False)  # tuples are lists in TOML
 
 
 class Mass(Section):

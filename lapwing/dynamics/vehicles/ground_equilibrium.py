@@ -57,14 +57,14 @@ def resting_pose(feet: Sequence[Vec3], terrain: Level | Relief = LEVEL, place: P
     return (x0, y0, max(lifts)), NO_ROTATION if slope == NO_SLOPE else from_matrix(R_world_body)
 
 
-def static_equilibrium(form: ModuleType, p: MultirotorParameters, pose: Pose, gravity: float) -> MultirotorState:
+def static_equilibrium(formulation: ModuleType, p: MultirotorParameters, pose: Pose, gravity: float) -> MultirotorState:
     """Return the state of a vehicle at rest on the springs and friction of its feet.
 
     If the ground is too steep for the friction, or the feet do not surround the centre of mass, the vehicle starts to
     slide or fall from this state.
 
     Args:
-        form: module of the state form: `lapwing.dynamics.vehicles.multirotor` or one with more bodies.
+        formulation: module of the formulation: `lapwing.dynamics.vehicles.multirotor` or one with more bodies.
         p: parameters of the vehicle.
         pose: pose from `resting_pose`.
         gravity: [m/s^2].
@@ -72,9 +72,9 @@ def static_equilibrium(form: ModuleType, p: MultirotorParameters, pose: Pose, gr
     position, attitude = pose
     k = next((k for k, e in enumerate(p.effects) if isinstance(e, GroundContact | GroundContactSmooth)), None)
     if k is None or gravity <= 0.0:
-        return form.initial_state(p, position, attitude)
+        return formulation.initial_state(p, position, attitude)
     position, attitude = _balance(p.effects[k], p.body.mass * gravity, position, attitude)
-    state = form.initial_state(p, position, attitude)
+    state = formulation.initial_state(p, position, attitude)
     deflections = _deflections(p.effects[k], position, attitude)
     return state._replace(memory=(*state.memory[:k], deflections or state.memory[k], *state.memory[k + 1 :]))
 

@@ -15,15 +15,15 @@ from lapwing.dynamics.effects._types import AnyMassProperties, Motion, PerRotor,
 from lapwing.dynamics.lie.quaternion import NO_ROTATION, Quaternion
 from lapwing.dynamics.vector import ZERO, Vec3
 from lapwing.dynamics.vehicles.multirotor_equations import (
-    MultirotorDrive,
     MultirotorParameters,
     MultirotorState,
     RotorLayout,
-    accelerations_of_form,
+    StepInputs,
+    accelerations_of_state,
     evaluate,
     motion_of,
 )
-from lapwing.dynamics.vehicles.multirotor_stepper import begin, steps, within
+from lapwing.dynamics.vehicles.multirotor_stepper import begin, steps, with_known_wrenches, within
 from lapwing.dynamics.vehicles.step_bound import parts
 from lapwing.kernels import kernel
 from lapwing.kernels.codegen import map_tuple
@@ -70,9 +70,9 @@ def advance(method, p, key, tick, state, command, h, n):
     """
     interval = n * h
     start = tick * interval
-    drive = begin(p, key, tick, state, command, interval)
-    split = parts(p, motion_of(p.layout, state.motion), drive.memory, h)
-    x, memory = steps(method, drive, state.motion, start, start + interval, h / split, 0, n * split)
+    u = begin(p, key, tick, state, command, interval)
+    split = parts(p, motion_of(p.layout, state.motion), u.memory, h)
+    x, memory = steps(method, u, state.motion, start, start + interval, h / split, 0, n * split)
     return MultirotorState(x, memory)
 
 
@@ -82,9 +82,11 @@ def observe(p, tick, interval, state, command):
     layout = p.layout
     voltage = map_tuple(within, layout.max_voltage, command, command)
     body = hooks.all_mass_properties(p.effects, state.memory, p.body)
-    drive = MultirotorDrive(p, body, state.memory, voltage)
-    s, rotors, _, _ = evaluate(drive, tick * interval, motion_of(layout, state.motion))
-    linear, angular = accelerations_of_form(drive, tick * interval, state.motion)
+    motion = motion_of(layout, state.motion)
+    # what `_awake_rate` evaluates, which therefore is compiled once for both
+    u, _ = with_known_wrenches(StepInputs(p, body, state.memory, voltage), motion)
+    s, rotors, _, _ = evaluate(u, tick * interval, motion)
+    linear, angular = accelerations_of_state(u, tick * interval, state.motion)
     # without a battery, a source of constant voltage delivers the power of the motors
     source = (math.nan, layout.max_voltage, total(rotors.power) / layout.max_voltage, math.nan)
     return MultirotorObservation(
@@ -100,7 +102,7 @@ def observe(p, tick, interval, state, command):
         hooks.all_winds(p.effects, state.memory, s.air.wind_world),
         s.body.mass,
         hooks.all_contacts(p.effects, state.memory, s),
-        hooks.all_battery_states(p.effects, state.memory, total(rotors.power), source),
+        hooks.battery_state(p.effects, state.memory, total(rotors.power), source),
     )
 
 

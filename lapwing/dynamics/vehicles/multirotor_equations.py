@@ -2,7 +2,7 @@
 
 This module has only kinematics, Newton's and Euler's equations and the lag of the rotors (theory, chapter 1);
 every force is an effect (lapwing/dynamics/effects). All functions are pure. The representation of the motion in the
-state is a form (`FORMS`): here one rigid body; other modules add forms with the same effects and steps.
+state is a formulation (`FORMULATIONS`): here one rigid body; other modules add more with the same effects and steps.
 """
 
 from collections.abc import Callable
@@ -26,7 +26,7 @@ from lapwing.dynamics.lie.quaternion import rotation_matrix
 from lapwing.dynamics.vector import ZERO, Vec3, product
 from lapwing.dynamics.vehicles.newton_euler import newton_euler
 from lapwing.kernels import DispatchTable, always_inline, noinline
-from lapwing.kernels.codegen import generic, map_tuple, reduce_tuple
+from lapwing.kernels.codegen import dispatch, generic, map_tuple, reduce_tuple
 
 PLAIN_TOLERANCE = 1e-13  # below it, the error of plain sums of the parts of a step can exceed the accuracy
 ROUNDING, MOST_ROUNDS = 1e-14, 16  # relative to the battery's voltage; of the iteration for it
@@ -46,7 +46,7 @@ class RotorLayout(NamedTuple):
     lag_rate: float  # [1/s]
     max_voltage: float  # [V]
     no_load_current: float  # [A]
-    bodies: Any = ()  # data of forms with several bodies
+    bodies: Any = ()  # data of formulations with several bodies
     axis: tuple[Vec3, ...] = ()  # unit vector of each rotor's thrust in the body; () if it is body z
 
 
@@ -68,7 +68,7 @@ def with_tolerance(p: MultirotorParameters, tolerance: float) -> MultirotorParam
 class MultirotorState(NamedTuple):
     """Plant state from one communication step to the next."""
 
-    motion: Any  # an instance of a class in FORMS: Motion, or several bodies
+    motion: Any  # an instance of a class in FORMULATIONS: Motion, or several bodies
     memory: tuple  # memory of each effect
 
 
@@ -77,20 +77,22 @@ def _never(layout, x, h):
     return False
 
 
-class StateForm(NamedTuple):
+class Formulation(NamedTuple):
     """Compiled functions of a class that represents the motion in the state."""
 
     motion: Callable  # (layout, x) -> Motion that effects read
-    rate: Callable  # (drive, t, x) -> tangent of x
-    project: Callable  # (drive, x) -> x after a step, projected onto its constraints
-    accelerations: Callable  # (drive, t, x) -> (linear [m/s^2] in the world, angular [rad/s^2] in the body)
-    switches: Callable = _never  # (layout, x, h) -> True if a force of the form can begin or end within h [s]
+    rate: Callable  # (u, t, x) -> tangent of x
+    project: Callable  # (u, x) -> x after a step, projected onto its constraints
+    accelerations: Callable  # (u, t, x) -> (linear [m/s^2] in the world, angular [rad/s^2] in the body)
+    switches: Callable = _never  # (layout, x, h) -> True if a force of the formulation can begin or end within h [s]
 
 
-FORMS = DispatchTable()
+FORMULATIONS = DispatchTable()
+motion_of = dispatch(FORMULATIONS, 1, "motion")
+accelerations_of_state = dispatch(FORMULATIONS, 2, "accelerations")
 
 
-class MultirotorDrive(NamedTuple):
+class StepInputs(NamedTuple):
     """Inputs of the rate of change that are constant over a step."""
 
     parameters: MultirotorParameters
@@ -111,11 +113,11 @@ def _static_current(s, torque, voltage):
 
 
 @always_inline
-def _motors(drive, s, loads, voltage):
+def _motors(u, s, loads, voltage):
     """Return (acceleration [rad/s^2], current [A], power [W]) of each rotor under its voltage [V]."""
     current = map_tuple(_static_current, s, loads.torque, voltage)
     lag = (map_tuple(_lag, s, s.motion.rotor_speed, voltage), current, map_tuple(product, 0.0, voltage, current))
-    return hooks.all_motors(drive.parameters.effects, drive.memory, s, loads, voltage, lag)
+    return hooks.all_motors(u.parameters.effects, u.memory, s, loads, voltage, lag)
 
 
 @always_inline
@@ -129,26 +131,26 @@ def _higher(_, highest, voltage, __):
 
 
 @always_inline
-def _excess(drive, s, loads, voltage):
+def _excess(u, s, loads, voltage):
     """Return by how much [V] the battery's voltage under the motors' power at a supply of `voltage` is above it."""
-    power = total(_motors(drive, s, loads, map_tuple(_at_most, voltage, drive.voltage, drive.voltage))[2])
-    return hooks.battery_voltage(drive.parameters.effects, drive.memory, power) - voltage
+    power = total(_motors(u, s, loads, map_tuple(_at_most, voltage, u.voltage, u.voltage))[2])
+    return hooks.battery_voltage(u.parameters.effects, u.memory, power) - voltage
 
 
 @noinline
-def _limited_voltage(drive, s, loads, a):
+def _limited_voltage(u, s, loads, a):
     """Return the battery's voltage [V] under the power of motors that it limits; `a`: its voltage without load [V].
 
     The power grows with the voltage, so the root lies between the voltages without load and under the power for it.
     """
-    at_a = _excess(drive, s, loads, a)
+    at_a = _excess(u, s, loads, a)
     b, rounding = a + at_a, ROUNDING * a
-    at_b = _excess(drive, s, loads, b)
+    at_b = _excess(u, s, loads, b)
     for _ in range(MOST_ROUNDS):
         if abs(at_b) <= rounding:
             break
         c = b - at_b * ((b - a) / (at_b - at_a))
-        at_c = _excess(drive, s, loads, c)
+        at_c = _excess(u, s, loads, c)
         if at_c * at_b < 0.0:
             a, at_a = b, at_b
         else:  # the rule of false position converges from both sides with half the value at the other end (Illinois)
@@ -158,30 +160,30 @@ def _limited_voltage(drive, s, loads, a):
 
 
 @always_inline
-def _limited_by_battery(drive, s, loads):
+def _limited_by_battery(u, s, loads):
     """Return the voltages [V] of the motors, none above that of the battery under their power (theory, eq. (2.10))."""
-    highest = reduce_tuple(_higher, None, 0.0, drive.voltage, drive.voltage)
-    if _excess(drive, s, loads, highest) >= 0.0:
-        return drive.voltage
-    limit = _limited_voltage(drive, s, loads, hooks.battery_voltage(drive.parameters.effects, drive.memory, 0.0))
-    return map_tuple(_at_most, limit, drive.voltage, drive.voltage)
+    highest = reduce_tuple(_higher, None, 0.0, u.voltage, u.voltage)
+    if _excess(u, s, loads, highest) >= 0.0:
+        return u.voltage
+    limit = _limited_voltage(u, s, loads, hooks.battery_voltage(u.parameters.effects, u.memory, 0.0))
+    return map_tuple(_at_most, limit, u.voltage, u.voltage)
 
 
 @always_inline
-def _commanded(drive, s, loads):
-    return drive.voltage
+def _commanded(u, s, loads):
+    return u.voltage
 
 
 @generic(inline=True)
-def _supplied(effects, drive, s, loads):
+def _supplied(effects, u, s, loads):
     """Return the voltage [V] of each motor."""
     supplied = _limited_by_battery if has_battery(effects) else _commanded
-    return lambda effects, drive, s, loads: supplied(drive, s, loads)
+    return lambda effects, u, s, loads: supplied(u, s, loads)
 
 
 def has_battery(effects: Any) -> bool:
     """Return True if an effect limits the motors' voltages, by the type of the tuple of effects."""
-    return any(e.instance_class in hooks.HOOKS["terminal_voltage"] for e in effects.types)
+    return any(e.instance_class in hooks.HOOKS["battery"] for e in effects.types)
 
 
 @always_inline
@@ -190,9 +192,9 @@ def _constant(c, a, b):
 
 
 @always_inline
-def inputs(drive, t, motion):
+def inputs(u, t, motion):
     """Return the EffectInputs of a motion."""
-    p, memory, body = drive.parameters, drive.memory, drive.body
+    p, memory, body = u.parameters, u.memory, u.body
     R_world_body = rotation_matrix(motion.attitude)
     still = Air(STANDARD_DENSITY, (0.0, 0.0, 0.0))
     s = EffectInputs(t, motion, R_world_body, body, p.layout, still, ZERO)
@@ -202,17 +204,17 @@ def inputs(drive, t, motion):
 
 
 @always_inline
-def evaluate(drive, t, motion):
+def evaluate(u, t, motion):
     """Evaluate all effects. Return (inputs, rotors, force_world [N], torque_body [N m])."""
-    p, memory = drive.parameters, drive.memory
+    p, memory = u.parameters, u.memory
     layout, speed = p.layout, motion.rotor_speed
-    s = inputs(drive, t, motion)
+    s = inputs(u, t, motion)
     # -0.0 is neutral in addition, so the compiler removes it
     one, zero = map_tuple(_constant, 1.0, speed, speed), map_tuple(_constant, -0.0, speed, speed)
     factors = hooks.all_load_factors(p.effects, memory, s, Factors(one, one))
     loads = hooks.all_loads(p.effects, memory, s, factors, Loads(zero, zero))
-    voltage = _supplied(p.effects, drive, s, loads)
-    acceleration, current, power = _motors(drive, s, loads, voltage)
+    voltage = _supplied(p.effects, u, s, loads)
+    acceleration, current, power = _motors(u, s, loads, voltage)
     rotors = Rotors(loads.thrust, loads.torque, acceleration, current, voltage, power)
     thrust, torque = thrust_wrench(layout, loads)
     torque = hooks.all_torques(p.effects, memory, s, rotors, torque)
@@ -222,10 +224,10 @@ def evaluate(drive, t, motion):
 
 
 @always_inline
-def rate(drive, t, motion):
+def rate(u, t, motion):
     """Return the tangent of the motion: Newton's and Euler's equations (theory, eq. (1.3) to (1.6))."""
-    s, rotors, force, torque = evaluate(drive, t, motion)
-    linear, angular = newton_euler(s.body, drive, s, force, torque)
+    s, rotors, force, torque = evaluate(u, t, motion)
+    linear, angular = newton_euler(s.body, u, s, force, torque)
     return Motion(motion.velocity_world, motion.omega_body, linear, angular, rotors.acceleration)
 
 
@@ -235,22 +237,10 @@ def _itself(_, motion):
 
 
 @always_inline
-def accelerations(drive, t, motion):
+def accelerations(u, t, motion):
     """Return (linear [m/s^2] in the world, angular [rad/s^2] in the body)."""
-    s, _, force, torque = evaluate(drive, t, motion)
-    return newton_euler(s.body, drive, s, force, torque)
+    s, _, force, torque = evaluate(u, t, motion)
+    return newton_euler(s.body, u, s, force, torque)
 
 
-FORMS[Motion] = StateForm(_itself, rate, _itself, accelerations)
-
-
-@generic(inline=True)
-def motion_of(layout, x):
-    """Return the vehicle's Motion from any state form."""
-    return FORMS[x.instance_class].motion
-
-
-@generic(inline=True)
-def accelerations_of_form(drive, t, x):
-    """Return `accelerations` from any state form."""
-    return FORMS[x.instance_class].accelerations
+FORMULATIONS[Motion] = Formulation(_itself, rate, _itself, accelerations)

@@ -1,6 +1,6 @@
 """Five bodies of the multirotor in XYZ Euler angles on the general engine, which factorises every constraint row.
 
-A form of `multirotor`'s state, for comparison with `multirotor_multibody`. It is slower, and does not support a pitch
+A formulation of the multirotor, for comparison with `multirotor_multibody`. It is slower, and does not support a pitch
 of 90 degrees: there the tangent becomes infinite, which `singular` detects.
 """
 
@@ -17,7 +17,12 @@ from lapwing.dynamics.multibody.system import Arrays
 from lapwing.dynamics.vector import ZERO, Vec3, apply
 from lapwing.dynamics.vehicles import multirotor_multibody
 from lapwing.dynamics.vehicles import multirotor_multibody_equations as on_se3
-from lapwing.dynamics.vehicles.multirotor_equations import FORMS, MultirotorParameters, MultirotorState, StateForm
+from lapwing.dynamics.vehicles.multirotor_equations import (
+    FORMULATIONS,
+    Formulation,
+    MultirotorParameters,
+    MultirotorState,
+)
 from lapwing.kernels import always_inline, kernel, math, noinline
 
 NEAR = 0.02  # cosine of the pitch below which the angles are not used: 1 degree from the singularity
@@ -162,7 +167,7 @@ def motion_of(layout, x):
 
 
 @noinline
-def rate(drive, t, x):
+def rate(u, t, x):
     """Return the tangent by the augmented formulation (theory, eqs. (8.20)-(8.22)), which divides by cos(pitch)."""
     if not _all_upright(x):
         b = x.body
@@ -175,8 +180,8 @@ def rate(drive, t, x):
                 _singular_tangent(b[4]),
             )
         )
-    p = on_se3.machine(drive, t, motion_of(drive.parameters.layout, x))
-    bodies = drive.parameters.layout.bodies
+    p = on_se3.machine(u, t, motion_of(u.parameters.layout, x))
+    bodies = u.parameters.layout.bodies
     a = _system(bodies.arrays, p)
     q, v = _arrays(x)
     f = bodies.feedback
@@ -185,24 +190,24 @@ def rate(drive, t, x):
 
 
 @noinline
-def apply_constraint_impulse(drive, x):
+def apply_constraint_impulse(u, x):
     """See `multirotor_multibody_equations.apply_constraint_impulse`."""
-    p = on_se3.without_loads(drive, motion_of(drive.parameters.layout, x))
-    a = _system(drive.parameters.layout.bodies.arrays, p)
+    p = on_se3.without_loads(u, motion_of(u.parameters.layout, x))
+    a = _system(u.parameters.layout.bodies.arrays, p)
     q, v = _arrays(x)
     q, v = stabilisation.project(a, q, v, _drive_motion(a, p), _ranks(a))
     return _tree(q, v)
 
 
 @noinline
-def project(drive, x):
+def project(u, x):
     """Return the bodies with stabilised constraints."""
-    bodies = drive.parameters.layout.bodies
+    bodies = u.parameters.layout.bodies
     if bodies.hold == five_body_stabilisation.NONE or not _all_upright(x):
         return x
     if bodies.hold == five_body_stabilisation.PROJECTION:
-        return apply_constraint_impulse(drive, x)
-    p = on_se3.without_loads(drive, motion_of(drive.parameters.layout, x))
+        return apply_constraint_impulse(u, x)
+    p = on_se3.without_loads(u, motion_of(u.parameters.layout, x))
     a = _system(bodies.arrays, p)
     q, v = _arrays(x)
     q, v = stabilisation.partition(a, q, v, _drive_motion(a, p), _ranks(a))
@@ -210,16 +215,16 @@ def project(drive, x):
 
 
 @kernel
-def accelerations(drive, t, x):
+def accelerations(u, t, x):
     """Return (linear [m/s^2] in the world, angular [rad/s^2] in the body) of the chassis."""
-    b, tangent = x.body[0], rate(drive, t, x).body[0]
+    b, tangent = x.body[0], rate(u, t, x).body[0]
     G, change = cardan_angles.rate_matrix(b.angles), cardan_angles.rate_matrix_derivative(b.angles, b.angle_rates)
     from_rates, from_angles = apply(G, tangent.angle_rates), apply(change, b.angle_rates)
     angular = (from_rates[0] + from_angles[0], from_rates[1] + from_angles[1], from_rates[2] + from_angles[2])
     return tangent.velocity_world, angular
 
 
-FORMS[FiveEulerBodies] = StateForm(motion_of, rate, project, accelerations)
+FORMULATIONS[FiveEulerBodies] = Formulation(motion_of, rate, project, accelerations)
 
 
 def singular(x: FiveEulerBodies) -> int:

@@ -1,6 +1,6 @@
 """Equations of motion of a multirotor of five bodies, and the forces in its hinges.
 
-A form of the multirotor's state: each body has its own pose on SE(3), and the arrowhead structure is eliminated
+A formulation of the multirotor: each body has its own pose on SE(3), and the arrowhead structure is eliminated
 (theory, eqs. (8.40)-(8.46)). The bodies include `gyroscopic_torque`, and mass properties that the reduced model
 averages over a turn.
 """
@@ -16,7 +16,7 @@ from lapwing.dynamics.multibody import five_body_stabilisation as hold
 from lapwing.dynamics.multibody.delivery_drone import Drone
 from lapwing.dynamics.multibody.five_bodies import NO_WRENCH, FiveBodies, Machine, Rotor, Wrench
 from lapwing.dynamics.vector import ZERO, Vec3, add, cross, pair, product, scale, subtract
-from lapwing.dynamics.vehicles.multirotor_equations import FORMS, StateForm, evaluate
+from lapwing.dynamics.vehicles.multirotor_equations import FORMULATIONS, Formulation, evaluate
 from lapwing.kernels import always_inline, kernel
 from lapwing.kernels.codegen import map_tuple
 
@@ -61,11 +61,11 @@ def _triple(accelerations, load, k):
 
 
 @always_inline
-def applied_loads(drive, t, motion):
+def applied_loads(u, t, motion):
     """Return (inputs, AppliedLoads): the effects of `multirotor_equations.evaluate`, separated by body."""
-    s, rotors, force, torque = evaluate(drive, t, motion)
+    s, rotors, force, torque = evaluate(u, t, motion)
     R, layout = s.R_world_body, s.layout
-    field = hooks.all_fields(drive.parameters.effects, drive.memory, ZERO)
+    field = hooks.all_fields(u.parameters.effects, u.memory, ZERO)
     applied = add(scale(total(rotors.thrust), (R[2], R[5], R[8])), scale(s.body.mass, field))
     arms = (
         total(map_tuple(product, 0.0, layout.y_body, rotors.thrust)),
@@ -89,9 +89,9 @@ def _rotor(k, layout, R, motion, part):
 
 
 @always_inline
-def machine(drive, t, motion):
+def machine(u, t, motion):
     """Return `five_bodies.Machine` at a time, with the speeds of the state as imposed speeds."""
-    s, a = applied_loads(drive, t, motion)
+    s, a = applied_loads(u, t, motion)
     layout, R, part = s.layout, s.R_world_body, a.rotor
     rotors = (
         _rotor(0, layout, R, motion, part[0]),
@@ -112,49 +112,49 @@ def _still(k, layout, motion):
 
 
 @always_inline
-def without_loads(drive, motion):
+def without_loads(u, motion):
     """Return the machine without loads, for projection."""
-    layout = drive.parameters.layout
+    layout = u.parameters.layout
     rotors = (
         _still(0, layout, motion),
         _still(1, layout, motion),
         _still(2, layout, motion),
         _still(3, layout, motion),
     )
-    mass = drive.body.mass - total(layout.bodies.drone.propeller_mass)
-    return Machine(mass, drive.body.inertia, ZERO, NO_WRENCH, rotors, 0.0)
+    mass = u.body.mass - total(layout.bodies.drone.propeller_mass)
+    return Machine(mass, u.body.inertia, ZERO, NO_WRENCH, rotors, 0.0)
 
 
 @kernel
-def rate(drive, t, x):
+def rate(u, t, x):
     """Return the tangent of the five bodies."""
-    return five_bodies.rate(machine(drive, t, motion_of(drive.parameters.layout, x)), 0.0, x)
+    return five_bodies.rate(machine(u, t, motion_of(u.parameters.layout, x)), 0.0, x)
 
 
 @kernel
-def project(drive, x):
+def project(u, x):
     """Return the bodies with stabilised constraints."""
-    how = drive.parameters.layout.bodies.hold
+    how = u.parameters.layout.bodies.hold
     if how == hold.NONE:
         return x
-    p = without_loads(drive, motion_of(drive.parameters.layout, x))
+    p = without_loads(u, motion_of(u.parameters.layout, x))
     return hold.project(p, 0.0, x) if how == hold.PROJECTION else hold.partition(p, 0.0, x)
 
 
 @kernel
-def apply_constraint_impulse(drive, x):
+def apply_constraint_impulse(u, x):
     """Return the bodies after hinge impulses that satisfy all constraints and conserve momentum."""
-    return hold.project(without_loads(drive, motion_of(drive.parameters.layout, x)), 0.0, x)
+    return hold.project(without_loads(u, motion_of(u.parameters.layout, x)), 0.0, x)
 
 
 @kernel
-def accelerations(drive, t, x):
+def accelerations(u, t, x):
     """Return (linear [m/s^2] in the world, angular [rad/s^2] in the body) of the chassis."""
-    tangent = rate(drive, t, x)
+    tangent = rate(u, t, x)
     return tangent.chassis.velocity_world, tangent.chassis.omega_body
 
 
-FORMS[FiveBodies] = StateForm(motion_of, rate, project, accelerations)
+FORMULATIONS[FiveBodies] = Formulation(motion_of, rate, project, accelerations)
 
 
 @always_inline
@@ -171,12 +171,12 @@ def _on_chassis(chassis, x, reaction):
 
 
 @kernel
-def joints(drive, t, x):
+def joints(u, t, x):
     """Return (force [N], world; torque about the centre of mass [N m], body) of the hinges on each body, chassis first.
 
     The z component of a propeller's torque is that of its drive.
     """
-    on = five_bodies.reactions(machine(drive, t, motion_of(drive.parameters.layout, x)), 0.0, x)
+    on = five_bodies.reactions(machine(u, t, motion_of(u.parameters.layout, x)), 0.0, x)
     b, c = x.propellers, x.chassis
     chassis = total_wrench(
         (

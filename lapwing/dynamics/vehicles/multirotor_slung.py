@@ -1,6 +1,6 @@
 """Multirotor with a point mass on a massless cable, under the effects of its scene (theory, section 1.5).
 
-A form of `multirotor`'s state. The cable is a spring with a damper that can only pull. The force when it becomes taut
+A formulation of the multirotor. The cable is a spring with a damper that can only pull. The force when it becomes taut
 is bounded by its stiffness, while a rigid cable would need an impulse. Cables of steel or aramid are elastic, too;
 their frequency limits the step. While the cable can become taut or slack, or the load touches the ground, steps are
 under error control as in ground contact.
@@ -16,10 +16,10 @@ from lapwing.dynamics.terrain import surface
 from lapwing.dynamics.vector import ZERO, Vec3, add, apply, apply_transposed, cross, dot, norm, scale, subtract
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.multirotor_equations import (
-    FORMS,
+    FORMULATIONS,
+    Formulation,
     MultirotorParameters,
     MultirotorState,
-    StateForm,
     evaluate,
 )
 from lapwing.dynamics.vehicles.newton_euler import newton_euler
@@ -111,13 +111,13 @@ def load_acceleration(sling, field, air, pull, x):
 
 
 @kernel
-def rate(drive, t, x):
+def rate(u, t, x):
     """Return the tangent of vehicle and load (theory, eqs. (1.20) to (1.22))."""
-    sling = drive.parameters.layout.bodies
-    s, rotors, force, torque = evaluate(drive, t, x.vehicle)
+    sling = u.parameters.layout.bodies
+    s, rotors, force, torque = evaluate(u, t, x.vehicle)
     pull, turn = cable(sling, s.R_world_body, x)
-    field = hooks.all_fields(drive.parameters.effects, drive.memory, ZERO)
-    linear, angular = newton_euler(s.body, drive, s, add(force, pull), add(torque, turn))
+    field = hooks.all_fields(u.parameters.effects, u.memory, ZERO)
+    linear, angular = newton_euler(s.body, u, s, add(force, pull), add(torque, turn))
     v = x.vehicle
     tangent = Motion(v.velocity_world, v.omega_body, linear, angular, rotors.acceleration)
     return SlungMotion(tangent, x.load_velocity, load_acceleration(sling, field, s.air, pull, x))
@@ -129,9 +129,9 @@ def _itself(_, x):
 
 
 @kernel
-def accelerations(drive, t, x):
+def accelerations(u, t, x):
     """Return (linear [m/s^2] in the world, angular [rad/s^2] in the body) of the vehicle."""
-    tangent = rate(drive, t, x)
+    tangent = rate(u, t, x)
     return tangent.vehicle.velocity_world, tangent.vehicle.omega_body
 
 
@@ -167,7 +167,7 @@ def switches(layout, x, h):
     return slack or lands(sling, x.load_position, x.load_velocity, h)
 
 
-FORMS[SlungMotion] = StateForm(motion_of, rate, _itself, accelerations, switches)
+FORMULATIONS[SlungMotion] = Formulation(motion_of, rate, _itself, accelerations, switches)
 
 
 @always_inline

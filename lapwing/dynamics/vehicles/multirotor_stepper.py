@@ -1,14 +1,15 @@
 """Integrator steps of a multirotor's communication step, with error control in contact."""
 
 import math
-import sys
 from typing import Any, NamedTuple
 
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.effects import _stiff_effects as stiff_effects
 from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.dynamics.integrators import (
+    INCREMENTS,
     SHORTEST,
+    STEPS,
     CompensatedSum,
     add,
     exact,
@@ -18,11 +19,11 @@ from lapwing.dynamics.integrators import (
     value_of,
 )
 from lapwing.dynamics.vehicles.multirotor_equations import (
-    FORMS,
-    MultirotorDrive,
+    FORMULATIONS,
+    Formulation,
     MultirotorParameters,
-    StateForm,
-    accelerations_of_form,
+    StepInputs,
+    accelerations_of_state,
     evaluate,
     has_battery,
     inputs,
@@ -30,7 +31,7 @@ from lapwing.dynamics.vehicles.multirotor_equations import (
 )
 from lapwing.kernels import always_inline, kernel
 from lapwing.kernels import noinline as never_inlined
-from lapwing.kernels.codegen import generic, map_tuple, reduce_tuple
+from lapwing.kernels.codegen import dispatch, generic, map_tuple, reduce_tuple
 from lapwing.kernels.state_tree import finite, relative_difference
 
 BREAK_ROUNDING = 1e-6  # relative to a communication step: breakpoints this close to its ends count as the ends
@@ -38,29 +39,28 @@ SAG_RATE = 4.0  # largest relative rate of the battery's sag, over the rate of t
 
 
 @generic(inline=True)
-def _step(method, drive, t, x, h):
-    module = sys.modules[method.instance_class.__module__]
+def _step(method, u, t, x, h):
     if is_compensated(x):
-        return _compensated_step(module.increment, FORMS[x.types[0].instance_class])
-    one_step, form = module.step, FORMS[x.instance_class]
-    its_rate, project = form.rate, form.project
+        return _compensated_step(INCREMENTS[method.instance_class], FORMULATIONS[x.types[0].instance_class])
+    one_step, formulation = STEPS[method.instance_class], FORMULATIONS[x.instance_class]
+    its_rate, project = formulation.rate, formulation.project
     # inlined into `advance`, so that constants of an interval are computed once
-    return lambda method, drive, t, x, h: project(drive, one_step(its_rate, drive, t, x, h))
+    return lambda method, u, t, x, h: project(u, one_step(its_rate, u, t, x, h))
 
 
-def _compensated_step(increment, form):
-    its_rate, project = form.rate, form.project
+def _compensated_step(increment, formulation):
+    its_rate, project = formulation.rate, formulation.project
 
-    def step(method, drive, t, x, h):
-        value, remainder = add(x, increment(its_rate, drive, t, x.value, h))
-        return CompensatedSum(project(drive, value), remainder)
+    def step(method, u, t, x, h):
+        value, remainder = add(x, increment(its_rate, u, t, x.value, h))
+        return CompensatedSum(project(u, value), remainder)
 
     return step
 
 
-@generic(inline=True)
-def _form_switches(layout, x, h):
-    return FORMS[x.instance_class].switches
+_switches_of_state = dispatch(FORMULATIONS, 1, "switches")
+_rate_of_state = dispatch(FORMULATIONS, 2, "rate")
+_project_state = dispatch(FORMULATIONS, 1, "project")
 
 
 @always_inline
@@ -70,28 +70,29 @@ def _near(c, near, voltage, _):
 
 
 @generic(inline=True)
-def _supply(effects, drive, t, motion, h):
-    """Return (inputs, voltage [V] of each motor, True if the battery can begin or cease to limit one within h [s])."""
-    if not has_battery(effects):
-        return lambda effects, drive, t, motion, h: (inputs(drive, t, motion), drive.voltage, False)
+def _effects_switch(effects, u, t, motion, h):
+    """Return True if an effect can switch, or the battery can begin or cease to limit a motor, within h [s]."""
+    if has_battery(effects):
 
-    def supply(effects, drive, t, motion, h):
-        s, rotors, _, _ = evaluate(drive, t, motion)
-        limit = hooks.battery_voltage(effects, drive.memory, total(rotors.power))
-        sag = abs(hooks.battery_voltage(effects, drive.memory, 0.0) - limit)
-        near = limit, SAG_RATE * s.layout.lag_rate * h * sag
-        return s, rotors.voltage, reduce_tuple(_near, near, False, drive.voltage, drive.voltage)
+        def switch(effects, u, t, motion, h):
+            s, rotors, _, _ = evaluate(u, t, motion)
+            limit = hooks.battery_voltage(effects, u.memory, total(rotors.power))
+            sag = abs(hooks.battery_voltage(effects, u.memory, 0.0) - limit)
+            near = limit, SAG_RATE * s.layout.lag_rate * h * sag
+            limiting = reduce_tuple(_near, near, False, u.voltage, u.voltage)
+            return limiting or hooks.all_switches(effects, u.memory, s, rotors.voltage, h)
 
-    return supply
+        return switch
+    if not any(e.instance_class in hooks.HOOKS["switches"] for e in effects.types):
+        return lambda effects, u, t, motion, h: False
+    return lambda effects, u, t, motion, h: hooks.all_switches(effects, u.memory, inputs(u, t, motion), u.voltage, h)
 
 
 @always_inline
-def switches(drive, t, x, h):
+def switches(u, t, x, h):
     """Return True if the loads can have a state-dependent jump or kink within h [s] after t [s]."""
-    p, seen = drive.parameters, motion_of(drive.parameters.layout, x)
-    s, voltage, limiting = _supply(p.effects, drive, t, seen, h)
-    own = _form_switches(p.layout, x, h) or limiting
-    return own or hooks.all_switches(p.effects, drive.memory, s, voltage, h)
+    p, seen = u.parameters, motion_of(u.parameters.layout, x)
+    return _switches_of_state(p.layout, x, h) or _effects_switch(p.effects, u, t, seen, h)
 
 
 @always_inline
@@ -102,18 +103,16 @@ def within(limit, voltage, _):
 
 @always_inline
 def _airborne(p, body, memory, voltage):
-    """Return the drive without the effects that can sleep."""
+    """Return the step inputs without the effects that can sleep."""
     effects = stiff_effects.without_sleepers(p.effects, p.effects)
     awake = stiff_effects.without_sleepers(p.effects, memory)
-    return MultirotorDrive(
-        MultirotorParameters(p.body, p.layout, effects, p.tolerance, p.summation), body, awake, voltage
-    )
+    return StepInputs(MultirotorParameters(p.body, p.layout, effects, p.tolerance, p.summation), body, awake, voltage)
 
 
 class AwakeState(NamedTuple):
-    """Motion with the memories of effects that have a rate: a form of the state during a step."""
+    """Motion with the memories of effects that have a rate: a formulation during a step."""
 
-    motion: Any  # an instance of another class in FORMS
+    motion: Any  # an instance of another class in FORMULATIONS
     memory: tuple
 
 
@@ -122,57 +121,54 @@ def _wake(layout, x):
     return motion_of(layout, x.motion)
 
 
-@generic(inline=True)
-def _rate_of_form(drive, t, x):
-    return FORMS[x.instance_class].rate
-
-
-@generic(inline=True)
-def _project_form(drive, x):
-    return FORMS[x.instance_class].project
-
-
 @always_inline
-def _with_memories(drive, x):
-    """Return the drive with the memories of the state."""
-    p, body, memory, voltage = drive
-    return MultirotorDrive(p, body, stiff_effects.with_integrated(p.effects, memory, x.memory), voltage)
+def _with_memories(u, x):
+    """Return the step inputs with the memories of the state."""
+    p, body, memory, voltage = u
+    return StepInputs(p, body, stiff_effects.with_integrated(p.effects, memory, x.memory), voltage)
 
 
 @generic(inline=True)
-def _memory_rates(effects, stiff, drive, t, motion):
-    """Return the rates of all memories that have one; `drive` has the wrenches that `stiff` belongs to."""
+def _memory_rates(effects, stiff, u, t, motion):
+    """Return the rates of all memories that have one; `u` has the wrenches that `stiff` belongs to."""
     if not stiff_effects.have_memory_rate(effects):
-        return lambda effects, stiff, drive, t, motion: stiff_effects.all_rates(effects, drive.memory, stiff, t, t)
+        return lambda effects, stiff, u, t, motion: stiff_effects.all_rates(effects, u.memory, stiff, t, t)
 
-    def rates(effects, stiff, drive, t, motion):
-        s, rotors, _, _ = evaluate(drive, t, motion)  # the same numbers as in the rate of the motion
-        return stiff_effects.all_rates(effects, drive.memory, stiff, s, rotors)
+    def rates(effects, stiff, u, t, motion):
+        s, rotors, _, _ = evaluate(u, t, motion)  # the same numbers as in the rate of the motion
+        return stiff_effects.all_rates(effects, u.memory, stiff, s, rotors)
 
     return rates
 
 
-@kernel
-def _awake_rate(drive, t, x):
-    p, body, memory, voltage = _with_memories(drive, x)
-    motion = motion_of(p.layout, x.motion)
+@always_inline
+def with_known_wrenches(u, motion):
+    """Return (step inputs with the wrenches of stiff effects in their place, the rate of each one's memory, or ())."""
+    p, body, memory, voltage = u
     effects, stiff = stiff_effects.with_wrenches(p.effects, memory, motion)
     parameters = MultirotorParameters(p.body, p.layout, effects, p.tolerance, p.summation)
-    known = MultirotorDrive(parameters, body, memory, voltage)
-    return AwakeState(_rate_of_form(known, t, x.motion), _memory_rates(p.effects, stiff, known, t, motion))
+    return StepInputs(parameters, body, memory, voltage), stiff
+
+
+@kernel
+def _awake_rate(u, t, x):
+    u = _with_memories(u, x)
+    effects, motion = u.parameters.effects, motion_of(u.parameters.layout, x.motion)
+    known, stiff = with_known_wrenches(u, motion)
+    return AwakeState(_rate_of_state(known, t, x.motion), _memory_rates(effects, stiff, known, t, motion))
 
 
 @always_inline
-def _project_awake(drive, x):
-    return AwakeState(_project_form(drive, x.motion), x.memory)
+def _project_awake(u, x):
+    return AwakeState(_project_state(u, x.motion), x.memory)
 
 
 @always_inline
-def _awake_accelerations(drive, t, x):
-    return accelerations_of_form(_with_memories(drive, x), t, x.motion)
+def _awake_accelerations(u, t, x):
+    return accelerations_of_state(_with_memories(u, x), t, x.motion)
 
 
-FORMS[AwakeState] = StateForm(_wake, _awake_rate, _project_awake, _awake_accelerations)
+FORMULATIONS[AwakeState] = Formulation(_wake, _awake_rate, _project_awake, _awake_accelerations)
 
 
 @always_inline
@@ -188,14 +184,14 @@ def _origin(x, t):
 
 
 @never_inlined
-def _stiff_steps(method, drive, t, x, h, end):
+def _stiff_steps(method, u, t, x, h, end):
     """Return (motion, memory) at the time `end` by step doubling (theory, eq. (2.33)).
 
     Each substep is taken whole and in halves, with the effects' memories that have a rate; the difference is the error.
     The result of the halves is kept; they are no longer than h and than effects require. Compensated sums include the
     time, which is that from the first step.
     """
-    p, memory = drive.parameters, drive.memory
+    p, memory = u.parameters, u.memory
     allowed, substep = p.tolerance, 2.0 * h
     smallest = SHORTEST * allowed
     x = exact(p.summation, method, AwakeState(x, stiff_effects.all_integrated(p.effects, memory)))
@@ -209,7 +205,7 @@ def _stiff_steps(method, drive, t, x, h, end):
         half = 0.5 * size
         y, whole, start, length = x, x, origin + t, size
         for k in range(3):  # one call site: passing arguments at three took 1/6 of the time
-            y = _step(method, drive, start, y, length)
+            y = _step(method, u, start, y, length)
             if k == 0:
                 y, whole, length = x, y, half
             else:
@@ -228,44 +224,44 @@ def _stiff_steps(method, drive, t, x, h, end):
 
 @always_inline
 def begin(p, key, tick, state, command, interval):
-    """Return the drive of the communication step `tick`, with the random draws of effects. See `advance`."""
+    """Return the step inputs of the communication step `tick`, with the random draws of effects. See `advance`."""
     layout, memory = p.layout, state.memory
     voltage = map_tuple(within, layout.max_voltage, command, command)
     before = _airborne(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, voltage)
     s, rotors, _, _ = evaluate(before, tick * interval, motion_of(layout, state.motion))
     memory = hooks.all_discrete_updates(p.effects, memory, s, rotors, key, tick, interval)
     memory = hooks.all_timed_updates(p.effects, memory, (tick + BREAK_ROUNDING) * interval)
-    return MultirotorDrive(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, voltage)
+    return StepInputs(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, voltage)
 
 
 @generic(inline=True)
-def _step_with_memories(effects, method, drive, t, x, h):
+def _step_with_memories(effects, method, u, t, x, h):
     """Return (motion, memory) a step later."""
     if not stiff_effects.have_memory_rate(effects):
-        return lambda effects, method, drive, t, x, h: (_step(method, drive, t, x, h), drive.memory)
+        return lambda effects, method, u, t, x, h: (_step(method, u, t, x, h), u.memory)
 
-    def step(effects, method, drive, t, x, h):
-        y = _step(method, drive, t, AwakeState(x, stiff_effects.all_integrated(effects, drive.memory)), h)
-        return y.motion, stiff_effects.with_integrated(effects, drive.memory, y.memory)
+    def step(effects, method, u, t, x, h):
+        y = _step(method, u, t, AwakeState(x, stiff_effects.all_integrated(effects, u.memory)), h)
+        return y.motion, stiff_effects.with_integrated(effects, u.memory, y.memory)
 
     return step
 
 
 @always_inline
-def airborne_step(method, drive, t, x, h):
+def airborne_step(method, u, t, x, h):
     """Return (motion, memory) a step later, without the effects that can sleep."""
-    p, body, memory, voltage = drive
+    p, body, memory, voltage = u
     airborne = _airborne(p, body, memory, voltage)
     x, awake = _step_with_memories(airborne.parameters.effects, method, airborne, t, x, h)
     return x, stiff_effects.with_awake(p.effects, memory, awake)
 
 
 @generic(inline=True)
-def _mixed_step(effects, method, drive, t, x, h):
+def _mixed_step(effects, method, u, t, x, h):
     """Return (motion, memory) a step later in which some effects sleep but no stiff one is awake."""
     if stiff_effects.only_stiff_sleep(effects):  # there is no such step
-        return lambda effects, method, drive, t, x, h: (x, drive.memory)
-    return lambda effects, method, drive, t, x, h: _step_with_memories(effects, method, drive, t, x, h)
+        return lambda effects, method, u, t, x, h: (x, u.memory)
+    return lambda effects, method, u, t, x, h: _step_with_memories(effects, method, u, t, x, h)
 
 
 @always_inline
@@ -280,12 +276,12 @@ def next_break(p, memory, start, interval, end, h):
 
 
 @always_inline
-def steps(method, drive, x, start, end, h, first, n):
+def steps(method, u, x, start, end, h, first, n):
     """Return (motion, discrete state) at the `end` [s] of an interval from `start`, from step `first` of its n.
 
     Steps end at the effects' breakpoints. The parts of the interval are divided into steps of at most h.
     """
-    p, body, memory, voltage = drive
+    p, body, memory, voltage = u
     interval, longest = end - start, h
     stop = next_break(p, memory, start, interval, end, longest)
     while True:
@@ -294,16 +290,16 @@ def steps(method, drive, x, start, end, h, first, n):
             h = (stop - start) / n
         until = min(stop, end)
         for i in range(first, n):
-            seen, drive = motion_of(p.layout, x), MultirotorDrive(p, body, memory, voltage)
-            switching = switches(drive, start + i * h, x, h)
+            seen, u = motion_of(p.layout, x), StepInputs(p, body, memory, voltage)
+            switching = switches(u, start + i * h, x, h)
             asleep = hooks.all_sleeping(p.effects, memory, seen, h) and hooks.all_can_sleep(p.effects, memory)
             if asleep and not switching:
-                x, memory = airborne_step(method, drive, start + i * h, x, h)
+                x, memory = airborne_step(method, u, start + i * h, x, h)
                 continue
             if switching or not stiff_effects.all_stiff_sleeping(p.effects, memory, seen, h):
-                x, memory = _stiff_steps(method, drive, start + i * h, x, h, until)
+                x, memory = _stiff_steps(method, u, start + i * h, x, h, until)
                 break
-            x, memory = _mixed_step(p.effects, method, drive, start + i * h, x, h)
+            x, memory = _mixed_step(p.effects, method, u, start + i * h, x, h)
         if not stop < end:
             return x, memory
         memory = hooks.all_timed_updates(p.effects, memory, stop)

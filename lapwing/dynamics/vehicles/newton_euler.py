@@ -29,7 +29,7 @@ def _about_principal_axes(body, omega, torque):
 
 
 @generic(inline=True)
-def newton_euler(body, drive, s, force, torque):
+def newton_euler(body, u, s, force, torque):
     """Return (linear [m/s^2], world; angular [rad/s^2], body) acceleration, by mass properties class.
 
     The force [N] is in the world, the torque [N m] in the body about the motion's position.
@@ -38,15 +38,15 @@ def newton_euler(body, drive, s, force, torque):
 
 
 @always_inline
-def _about_centre(body, drive, s, force, torque):
+def _about_centre(body, u, s, force, torque):
     return scale(body.inverse_mass, force), angular_acceleration(body, s.motion.omega_body, torque)
 
 
 @always_inline
-def _about_offset_centre(body, drive, s, force, torque):
+def _about_offset_centre(body, u, s, force, torque):
     """Return the accelerations for a centre of mass at c from the position, where gravity acts (eq. (2.42))."""
     R, omega, c = s.R_world_body, s.motion.omega_body, body.centre_body
-    weight = scale(body.mass, hooks.all_fields(drive.parameters.effects, drive.memory, ZERO))
+    weight = scale(body.mass, hooks.all_fields(u.parameters.effects, u.memory, ZERO))
     others = apply_transposed(R, subtract(force, weight))
     angular = _with_products(body, omega, subtract(torque, cross(c, others)))
     turning = add(cross(angular, c), cross(omega, cross(omega, c)))

@@ -9,9 +9,9 @@ from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.multibody.five_bodies import FiveBodies
 from lapwing.dynamics.vehicles import multirotor_euler
 from lapwing.dynamics.vehicles.multirotor_equations import (
-    MultirotorDrive,
     MultirotorParameters,
     MultirotorState,
+    StepInputs,
     motion_of,
 )
 from lapwing.dynamics.vehicles.multirotor_multibody_equations import apply_constraint_impulse
@@ -30,17 +30,17 @@ class Failure(NamedTuple):
 
 
 @generic()
-def _after_impulses(drive: types.Type, x: types.Type) -> Any:
+def _after_impulses(u: types.Type, x: types.Type) -> Any:
     """Return the bodies after impulses in their hinges, in any coordinates."""
     return apply_constraint_impulse if x.instance_class is FiveBodies else multirotor_euler.apply_constraint_impulse
 
 
 @kernel
 def _after_failure(failure, memory, voltage, x):
-    """Return (drive, motion) after a failure."""
+    """Return (step inputs, motion) after a failure."""
     p = failure.vehicle
-    drive = MultirotorDrive(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, voltage)
-    return drive, _after_impulses(drive, x) if failure.impulse else x
+    u = StepInputs(p, hooks.all_mass_properties(p.effects, memory, p.body), memory, voltage)
+    return u, _after_impulses(u, x) if failure.impulse else x
 
 
 @kernel
@@ -55,20 +55,20 @@ def advance_through(method, p, failures, key, tick, state, command, h, n):
     count, rounding = len(failures), BREAK_ROUNDING * interval
     k = 0
     while k < count and failures[k].time <= start + rounding:
-        drive, x = _after_failure(failures[k], state.memory, command, state.motion)
+        u, x = _after_failure(failures[k], state.memory, command, state.motion)
         p, state = failures[k].vehicle, MultirotorState(x, state.memory)
         k += 1
-    drive, x = begin(p, key, tick, state, command, interval), state.motion
-    split, whole = parts(p, motion_of(p.layout, x), drive.memory, h), k == count
+    u, x = begin(p, key, tick, state, command, interval), state.motion
+    split, whole = parts(p, motion_of(p.layout, x), u.memory, h), k == count
     size, number, longest = h / split, n * split, h / split
     while True:
         until = failures[k].time if k < count else end
         if not whole:
             number = max(1, math.ceil((until - start) / longest - BREAK_ROUNDING))
             size = (until - start) / number
-        x, memory = steps(method, drive, x, start, until, size, 0, number)
+        x, memory = steps(method, u, x, start, until, size, 0, number)
         if k == count:
             return MultirotorState(x, memory)
-        drive, x = _after_failure(failures[k], memory, drive.voltage, x)
+        u, x = _after_failure(failures[k], memory, u.voltage, x)
         start = until
         k += 1

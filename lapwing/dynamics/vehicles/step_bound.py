@@ -40,8 +40,7 @@ def parts(p, motion, memory, h):
     """
     if not is_valid(motion, h):
         return 1  # lost; parts would only cost time
-    damping = hooks.all_damping_rates(p.effects, memory, motion, p.body)
-    rate = max(max(p.layout.lag_rate, hooks.all_decay_rates(p.effects, memory, p.layout)), damping)
+    rate = max(p.layout.lag_rate, hooks.all_decay_rates(p.effects, memory, motion, p.body, p.layout))
     number = max(h * rate / FASTEST_RATE, h * norm(motion.omega_body) / LARGEST_TURN)
     return max(1, math.ceil(number)) if number < MOST_PARTS else MOST_PARTS
 
@@ -50,10 +49,9 @@ def causes(p: Any, memory: tuple) -> list[Cause]:
     """Return the rates of a vehicle at rest, the fastest first: the motors' lag, and effects by name."""
     result = [Cause("motors", p.layout.lag_rate)]
     for e, own in zip(p.effects, memory, strict=True):
-        for hook, arguments in (("decay_rate", (p.layout,)), ("damping_rate", (_AT_REST, p.body))):
-            if type(e) in hooks.HOOKS[hook]:
-                rate = python_function(hooks.HOOKS[hook][type(e)])(e, own, *arguments)
-                result.append(Cause(type(e).__module__.rsplit(".", 1)[-1], rate))
+        if type(e) in hooks.HOOKS["decay_rate"]:
+            rate = python_function(hooks.HOOKS["decay_rate"][type(e)])(e, own, _AT_REST, p.body, p.layout)
+            result.append(Cause(type(e).__module__.rsplit(".", 1)[-1], rate))
     return sorted(result, key=lambda cause: -cause.rate)
 
 

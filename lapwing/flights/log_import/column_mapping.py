@@ -7,11 +7,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, ValidationError
+from pydantic import ConfigDict, ValidationError
 
 from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.input_file import read_text, unreadable
-from lapwing.dynamics.validation import fault
+from lapwing.dynamics.validation import Table, fault
 
 SCALES = {
     "s": 1.0, "ms": 1e-3, "us": 1e-6, "ns": 1e-9,
@@ -24,8 +24,8 @@ SCALES = {
 }  # fmt: skip
 
 
-class _Table(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
+class _Table(Table):
+    model_config = ConfigDict(strict=False)  # tuples are lists in TOML
 
 
 class Scalar(_Table):

@@ -3,17 +3,17 @@
 import base64
 from typing import Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from lapwing.cosim.scene import Files, Scene
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.validation import Table
 from lapwing.services.common.schemas.named_tables import NamedTables
 
 
-class FmuTable(BaseModel):
+class FmuTable(Table):
     """Table `[services.NAME]` of an FMU."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False)
     fmu: str  # path of the FMU, relative to the scene
     embed: bool = False  # store the FMU in the run configuration, and therefore in the log
     content: str | None = None  # the embedded FMU in base64; written by `embed`

@@ -100,16 +100,9 @@ class KernelLibrary(JITCodeLibrary):
             self._declare_variants()
         if self.no_refcount:
             _remove_refcounts(self._final_module)
-        codegen = self._codegen
-        cheap = {
-            "loop_vectorize": codegen._loopvect,
-            "slp_vectorize": False,
-            "opt": codegen._opt_level,
-            "cost": "cheap",
-        }
-        for options in (cheap, {}):  # the two runs of numba
-            manager, builder = codegen._module_pass_manager(**options)
-            _run(manager, self._final_module, builder)
+        # numba runs a cheap pass manager before, for kernels that count more references than ours
+        manager, builder = self._codegen._module_pass_manager()
+        _run(manager, self._final_module, builder)
 
     def _make_names_unique(self) -> None:
         """Rename the functions of numba that are not inlined. See `call_convention.unique`."""
@@ -119,7 +112,7 @@ class KernelLibrary(JITCodeLibrary):
                 function.name = unique(function.name)
 
     def _optimize_functions(self, module: Any) -> None:
-        """Run the function passes. numba also creates a pass manager for declarations, which takes most of the time."""
+        """Run the function passes. Numba also creates a pass manager for declarations, which takes most of the time."""
         module.data_layout = self._codegen._data_layout
         for function in module.functions:
             if not function.is_declaration:
@@ -127,9 +120,9 @@ class KernelLibrary(JITCodeLibrary):
                 _run(manager, function, builder)
 
     def _function_passes(self) -> Any:
-        """Return a pass manager and its builder."""
+        """Return a pass manager and its builder: of level 1, since the module passes follow."""
         if not self.vectorise_loops:
-            return self._codegen._function_pass_manager()
+            return self._codegen._function_pass_manager(opt=1)
         options = binding.create_pipeline_tuning_options(config.OPT)  # type: ignore[attr-defined]
         options.loop_unrolling = options.loop_vectorization = options.slp_vectorization = False
         builder = binding.create_pass_builder(self._codegen._tm, options)

@@ -49,7 +49,7 @@ def desired_load(path, t):
 @always_inline
 def desired_specific_force(p, t, x, acceleration):
     """Return the desired v' - a_g of the load [m/s^2] and its derivative, at its actual acceleration (eq. (7.22))."""
-    c = p.drive
+    c = p.control
     position, velocity, desired_acceleration = desired_load(c.path, t)
     e_y, e_v = subtract(x.load_position, position), subtract(x.load_velocity, velocity)
     feedback = add(scale(-c.load_position_gain, e_y), scale(-c.load_velocity_gain, e_v))
@@ -84,7 +84,7 @@ def shares(p, x, desired, slope):
 @kernel
 def desired_force(p, x, desired, slope, s, s_rate, omega_rate, i):
     """Return the desired world force [N] of quadrotor i, and its derivative (theory, eqs. (7.24) and (7.25))."""
-    c = p.drive
+    c = p.control
     q, omega = x.link[i].direction, x.link[i].omega
     m, inertia = p.quad_mass[i], p.quad_mass[i] * p.link_length[i]
     parallel = dot(q, s) + inertia * dot(omega, omega) + m * dot(q, desired)
@@ -136,7 +136,7 @@ def desired_attitude(force, force_rate):
 @kernel
 def moment(p, x, force, force_rate, i):
     """Return the moment [N m] that aligns body z with the desired force (theory, eq. (7.27))."""
-    c = p.drive
+    c = p.control
     limited, kept_rate = upright(force, force_rate, UPRIGHT_SHARE * p.quad_mass[i] * p.gravity)
     desired, desired_omega = desired_attitude(limited, kept_rate)
     difference = matmul(transpose(desired), rotation_matrix(x.attitude[i]))

@@ -29,7 +29,7 @@ class CooperativeLoadParameters(NamedTuple):
     link_length: tuple[float, ...]  # [m]
     load_mass: float  # [kg]
     gravity: float  # [m/s^2]
-    drive: Any  # a LiftCommand, or the parameters of a control law registered in COMMANDS
+    control: Any  # a LiftCommand, or the parameters of a control law registered in COMMANDS
 
     def check(self, x0: Any) -> None:
         """Raise ValueError for fewer than two quadrotors, unequal lengths of tuples, or a non-positive mass or link."""
@@ -58,20 +58,20 @@ class CooperativeLoadState(NamedTuple):
 
 
 COMMANDS = DispatchTable()
-"""The compiled `command(p, t, x) -> LiftCommand` of a control law, by the class of its parameters (`p.drive`)."""
+"""The compiled `command(p, t, x) -> LiftCommand` of a control law, by the class of its parameters (`p.control`)."""
 
 
 def command(p: CooperativeLoadParameters, t: float, x: CooperativeLoadState) -> LiftCommand:
-    """Return the LiftCommand at time t: `p.drive` itself, or the output of its control law."""
-    return p.drive if isinstance(p.drive, LiftCommand) else COMMANDS[type(p.drive)](p, t, x)
+    """Return the LiftCommand at time t: `p.control` itself, or the output of its control law."""
+    return p.control if isinstance(p.control, LiftCommand) else COMMANDS[type(p.control)](p, t, x)
 
 
 @overload_for(command)
 def _command(p, t, x):
-    drive = p.types[p.fields.index("drive")].instance_class
-    if drive is LiftCommand:
-        return lambda p, t, x: p.drive
-    law = COMMANDS[drive]
+    control = p.types[p.fields.index("control")].instance_class
+    if control is LiftCommand:
+        return lambda p, t, x: p.control
+    law = COMMANDS[control]
     return lambda p, t, x: law(p, t, x)
 
 

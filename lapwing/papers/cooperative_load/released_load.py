@@ -21,7 +21,7 @@ class ReleasedLoadParameters(NamedTuple):
     quad_mass: tuple[float, ...]  # [kg]
     quad_inertia: tuple[Vec3, ...]  # [kg m^2] principal moments
     gravity: float  # [m/s^2]
-    drive: LiftCommand
+    control: LiftCommand
 
 
 class ReleasedLoadState(NamedTuple):
@@ -41,14 +41,14 @@ def release(p: CooperativeLoadParameters, x: CooperativeLoadState) -> tuple[Rele
     positions = tuple(formation.quad_position(p, x, i) for i in quads)
     velocities = tuple(formation.quad_velocity(p, x, i) for i in quads)
     return (
-        ReleasedLoadParameters(p.quad_mass, p.quad_inertia, p.gravity, p.drive),
+        ReleasedLoadParameters(p.quad_mass, p.quad_inertia, p.gravity, p.control),
         ReleasedLoadState(x.load_position, x.load_velocity, x.attitude, x.omega_body, positions, velocities),
     )
 
 
 @always_inline
 def _acceleration(p, x, i):
-    force = formation.thrust_world(x, p.drive.thrust, i)
+    force = formation.thrust_world(x, p.control.thrust, i)
     return add(scale(1.0 / p.quad_mass[i], force), (0.0, 0.0, -p.gravity))
 
 
@@ -59,7 +59,7 @@ def rate(p, t, x):
         x.load_velocity,
         (0.0, 0.0, -p.gravity),
         x.omega_body,
-        map_index(formation.body_rate, x.quad_position, p, x, p.drive),
+        map_index(formation.body_rate, x.quad_position, p, x, p.control),
         x.quad_velocity,
         map_index(_acceleration, x.quad_position, p, x),
     )

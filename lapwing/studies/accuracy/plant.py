@@ -35,7 +35,7 @@ from lapwing.studies.accuracy.round_off import coordinates_in_extended_precision
 DURATION = 2.0  # [s] approximately
 HEIGHT = 20.0  # [m] clear of the ground
 FINEST = 64  # steps of the reference per communication step; other runs have at most half as many
-EXTENDED = (multirotor, multirotor_slung)  # forms with steps in extended precision
+EXTENDED = (multirotor, multirotor_slung)  # formulations with steps in extended precision
 JUMP, JUMP_INTERVAL = 0.02, 0.4  # [s] duration at a motor's limit; interval of the manoeuvres
 VARIATION = 0.1  # of the voltages of hover, up or down every `JUMP`, in `varying_voltages`
 TICK = 1000  # first tick, after the start of random effects
@@ -119,11 +119,11 @@ def physics(scene: Scene, level: bool = False) -> tuple[MultirotorParameters, Mu
         scene: scene of a multirotor.
         level: start level without rotation; otherwise tilted and rotating.
     """
-    form, p = model(scene).describe(scene)
+    formulation, p = model(scene).describe(scene)
     p = with_tolerance(p, TOLERANCE)
     attitude, omega_body = (NO_ROTATION, ZERO) if level else (exp((0.1, -0.15, 0.3)), (0.4, -0.6, 0.3))
-    state = form.initial_state(p, (0.0, 0.0, HEIGHT), attitude, hover_speed(p), (3.0, 1.0, -0.5), omega_body)
-    if form is multirotor_slung:  # stretched by the load, so the cable stays taut and no step is split
+    state = formulation.initial_state(p, (0.0, 0.0, HEIGHT), attitude, hover_speed(p), (3.0, 1.0, -0.5), omega_body)
+    if formulation is multirotor_slung:  # stretched by the load, so the cable stays taut and no step is split
         sling, (x, y, z) = p.layout.bodies, state.motion.load_position
         load = (x, y, z - sling.load_mass * gravity(scene) / sling.stiffness)
         state = state._replace(motion=state.motion._replace(load_position=load))
@@ -146,8 +146,8 @@ def problem(scene: Scene, manoeuvre: Voltages = gentle_voltages) -> Problem:
     exchange = scene[Communication]
     gentle = manoeuvre is gentle_voltages
     (p, state), longest = physics(scene, not gentle), longest_step(scene)
-    form = model(scene).describe(scene)[0]
-    motion = multirotor.initial_state(p).motion  # equal shape for every form of the state
+    formulation = model(scene).describe(scene)[0]
+    motion = multirotor.initial_state(p).motion  # equal shape for every formulation
     every = max(1, round(DURATION * exchange.rate / SAMPLES))
     duration = SAMPLES * every * exchange.interval
     start = TICK if gentle else 0
@@ -181,7 +181,7 @@ def problem(scene: Scene, manoeuvre: Voltages = gentle_voltages) -> Problem:
         settings = [h for h in (exchange.interval / 2**k for k in range(6)) if h <= longest]
         return SolverMethod(
             name, method.ORDER, "s", settings, lambda h: prepare_flight(method, round(exchange.interval / h)), read,
-            prepare_flight(method, 1, rows=1), final_state_in_extended_precision if form in EXTENDED else None,
+            prepare_flight(method, 1, rows=1), final_state_in_extended_precision if formulation in EXTENDED else None,
         )  # fmt: skip
 
     return Problem(

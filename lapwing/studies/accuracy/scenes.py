@@ -79,4 +79,4 @@ def with_lift(p: Any) -> Any:
         return p
     n = len(p.quad_mass)
     thrust = tuple(p.gravity * (m + p.load_mass / n) for m in p.quad_mass)
-    return p._replace(drive=LiftCommand(thrust, ((0.01, -0.02, 0.01),) * n))
+    return p._replace(control=LiftCommand(thrust, ((0.01, -0.02, 0.01),) * n))

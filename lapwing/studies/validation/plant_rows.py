@@ -12,7 +12,7 @@ from lapwing.cosim.scene import Overrides, Scene, SceneError
 from lapwing.dynamics import simd_batch
 from lapwing.dynamics.effects._rotor_sums import total
 from lapwing.dynamics.effects._types import Motion
-from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, evaluate, motion_of
+from lapwing.dynamics.vehicles.multirotor_equations import StepInputs, evaluate, motion_of
 from lapwing.kernels import kernel
 from lapwing.kernels.row_packing import pack_row, row_width
 from lapwing.services.common.schemas.communication_schema import Communication, Rates
@@ -189,8 +189,8 @@ def _electrical_power(example: Any, memory: Any, columns: int, out: Any, first: 
     """
     for m in range(first * LANES, last * LANES):
         x = simd_batch.take(example, memory, (m // LANES) * columns * LANES + m % LANES)
-        drive = MultirotorDrive(x.parameters, x.body, x.memory, x.voltage)
-        _, rotors, _, _ = evaluate(drive, x.start, motion_of(x.parameters.layout, x.motion))
+        u = StepInputs(x.parameters, x.body, x.memory, x.voltage)
+        _, rotors, _, _ = evaluate(u, x.start, motion_of(x.parameters.layout, x.motion))
         out[m] = total(rotors.power)
 
 

@@ -1,6 +1,5 @@
 """Controller block with a user-defined controller between land detector and control allocation."""
 
-import sys
 from collections.abc import Callable
 from typing import Any, NamedTuple
 
@@ -8,9 +7,9 @@ from numba import types
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.vector import Vec3
-from lapwing.kernels import always_inline, python_function
+from lapwing.kernels import DispatchTable, always_inline, python_function
 from lapwing.kernels.cell import read
-from lapwing.kernels.codegen import generic
+from lapwing.kernels.codegen import dispatch, generic
 from lapwing.services.autopilot import motor_failure
 from lapwing.services.autopilot.block import NO_READING, Controller, block_outputs, motors_off, start_step
 from lapwing.services.autopilot.custom.controller_output import (
@@ -65,6 +64,9 @@ def _parse_output(result: tuple, no_voltage: PerRotor) -> tuple[Any, ControllerO
     return result[0], parse_controller_output(result[1], no_voltage)
 
 
+_user_step = dispatch(DispatchTable("step"))
+
+
 @generic(inline=True)
 def _call_user_step(
     p: types.Type,
@@ -78,9 +80,8 @@ def _call_user_step(
     """Call `step` of the user's module, or read the port."""
     if p.instance_class is PythonControllerProxy:
         return lambda p, s, time, estimate, setpoint, by_port, no_voltage: (s, by_port[0].value)
-    user_step = sys.modules[p.instance_class.__module__].step
     return lambda p, s, time, estimate, setpoint, by_port, no_voltage: _parse_output(
-        user_step(p, s, time, estimate, setpoint), no_voltage
+        _user_step(p, s, time, estimate, setpoint), no_voltage
     )
 
 

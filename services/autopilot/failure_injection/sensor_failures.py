@@ -8,7 +8,7 @@ from numba import types
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.dynamics.noise import Key
 from lapwing.kernels import always_inline
-from lapwing.kernels.codegen import compile_source, generic
+from lapwing.kernels.codegen import compile_source, dispatch, generic
 from lapwing.services.autopilot.failure_injection.failure_state import Memory, is_dropped
 from lapwing.services.autopilot.failure_injection.reading_failures import FAILURES
 from lapwing.services.common.failure_types import DELAYED, GARBAGE, STUCK, WRONG
@@ -27,16 +27,8 @@ def kind_of(faults: types.Type, r: types.Type) -> Callable:
     return compile_source("kind_of(faults, r)", {}, f"return faults.{FAILURES[r.instance_class].field}")
 
 
-@generic(inline=True)
-def wrong_reading(r: types.Type) -> Any:
-    """Return the reading of a wrong sensor."""
-    return FAILURES[r.instance_class].wrong
-
-
-@generic(inline=True)
-def garbage_reading(r: types.Type, key: types.Type, tick: types.Type) -> Any:
-    """Return a random reading at a tick."""
-    return FAILURES[r.instance_class].garbage
+wrong_reading = dispatch(FAILURES, 0, "wrong")
+garbage_reading = dispatch(FAILURES, 0, "garbage")
 
 
 @generic(inline=True)

@@ -6,19 +6,16 @@ the outputs are late or unexpected, and to poll the firmware's MAVLink link.
 """
 
 import ctypes
-import sys
 import time
-from collections.abc import Callable
 from typing import Any, NamedTuple
 
 import numpy as np
-from numba import types
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, NON_FINITE, InputRing, ring_index
 from lapwing.cosim.diagram.tick_schedule import LATCHED
 from lapwing.dynamics.vector import ZERO
-from lapwing.kernels import always_inline
-from lapwing.kernels.codegen import generic, map_tuple
+from lapwing.kernels import DispatchTable, always_inline
+from lapwing.kernels.codegen import dispatch, map_tuple
 from lapwing.kernels.native_calls import address_of, call_int, call_long
 from lapwing.kernels.row_packing import load, pack_row, store
 from lapwing.services.common.firmware.hold import FirmwareCommand
@@ -130,9 +127,7 @@ def _publish(e: Shared, running: bool) -> None:
     store(FirmwareCommand(duty, armed, landed, e.flags[FINISHED] != 0, e.flags[STATUS_TEXT], ZERO), e.command, 0)
 
 
-@generic(inline=True)
-def _exchange(p: types.Type, tick: types.Type) -> Callable:
-    return sys.modules[p.instance_class.__module__].exchange  # type: ignore[no-any-return]
+_exchange = dispatch(DispatchTable("exchange"))
 
 
 @always_inline

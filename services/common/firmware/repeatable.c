@@ -16,7 +16,7 @@
  *
  * Lapwing gets these lines through a socket: "attached", "linked", "ready" (all threads wait for the first message),
  * "foreign ..." (a call or traffic that is not repeatable), "stuck ..." (a thread that does not pass the turn on). The
- * clock runs freely once Lapwing closes the socket, so that the firmware can end.
+ * clock follows the real time once Lapwing closes the socket, so that the firmware can end.
  */
 #define _GNU_SOURCE
 #include <dlfcn.h>
@@ -193,6 +193,12 @@ static void next_message(void) {
     wake_receivers(!waiting[SCRIPT]);
     fire_deadlines();
 }
+static void pass_time_until(uint64_t due) { /* at the end about as fast as real time: time-outs are reported, not floods */
+    if (due <= clock_ns) return;
+    struct timespec rest = {0, due - clock_ns < TICK ? due - clock_ns : TICK};
+    if (control < 0) syscall(SYS_nanosleep, &rest, NULL);
+    clock_ns = due;
+}
 static Thread *ready_thread(void) { /* the next in the order of creation, or a random one */
     static Thread *ready[MOST];
     int count = 0, next = 0;
@@ -220,7 +226,7 @@ static Thread *next_thread(void) {
         if (waiting[SCRIPT] && !commands) wait_outside(1);
         else if (link_fd >= 0 && (reader || read_ns) && !(due && due <= horizon)) next_message();
         else if (link_fd < 0 && wake_receivers(!waiting[SCRIPT])) continue;
-        else if (due && !opening) clock_ns = due > clock_ns ? due : clock_ns, fire_deadlines();
+        else if (due && !opening) pass_time_until(due), fire_deadlines();
         else wait_outside(0);
     }
     return t;

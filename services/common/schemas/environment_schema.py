@@ -5,7 +5,7 @@ from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Literal
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, ValidationError
+from pydantic import Field, ValidationError
 
 from lapwing.cosim.scene import Files, Scene, SceneTable
 from lapwing.dynamics.atmosphere import Atmosphere
@@ -13,6 +13,7 @@ from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.environment import FIRST_YEAR, LAST_YEAR, STANDARD, Environment, magnetic_field
 from lapwing.dynamics.geodesy import Home, normal_gravity
 from lapwing.dynamics.terrain import Level, Relief, relief
+from lapwing.dynamics.validation import Table
 from lapwing.dynamics.vector import Vec3
 from lapwing.services.common.schemas import height_file
 
@@ -26,12 +27,6 @@ Tesla = Annotated[float, Field(ge=-1e-4, le=1e-4)]
 MagneticField = Annotated[tuple[Tesla, Tesla, Tesla], Field(strict=False)]
 Heights = Annotated[tuple[float, ...], Field(strict=False)]
 Pair = Annotated[tuple[Place, Place], Field(strict=False)]
-
-
-class Table(BaseModel):
-    """A subtable of `[environment]`."""
-
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
 
 
 class Steps(Table):

@@ -14,11 +14,12 @@ Lapwing's autopilot acts on a breach of the fence by its parameter FS_FENCE_ACT,
 
 from typing import Annotated, Any, ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from lapwing.cosim.scene import Files, Scene, SceneTable
 from lapwing.cosim.scene.files import unvalidated_value
 from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.validation import Table
 from lapwing.messages import OperatorCommand, Vector3
 from lapwing.services.common.firmware.schema import OWN, firmware_of, flown_by_firmware
 from lapwing.services.common.plans.fence import Fence
@@ -31,10 +32,9 @@ SOURCE = "scene"
 Corners = Annotated[tuple[Pair, ...], Field(strict=False, min_length=3)]
 
 
-class Area(BaseModel):
+class Area(Table):
     """A polygon or a circle, of any height."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
     corners: Corners | None = None  # [m] world x, y of a polygon, or tables: latitude_deg, longitude_deg
     position: Pair | None = None  # [m] centre of a circle, as a corner, with radius, instead of corners
     radius: Length | None = None  # [m] of the circle

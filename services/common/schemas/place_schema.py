@@ -3,21 +3,21 @@
 from contextlib import suppress
 from typing import Annotated, Any
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
 from lapwing.cosim.scene.files import unvalidated_value
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.geodesy import Home, geodetic_to_enu
-from lapwing.dynamics.validation import validated
+from lapwing.dynamics.validation import Table, validated
 from lapwing.kernels import python_function
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 
 
-class PlaceTable(BaseModel):
+class PlaceTable(Table):
     """A place as a table: in metres or on the Earth."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(strict=False)
 
     x: Finite | None = None  # [m] along world x (east), of a waypoint from the start
     y: Finite | None = None  # [m] along world y (north)

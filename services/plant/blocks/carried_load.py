@@ -37,7 +37,7 @@ class LoadMotion(NamedTuple):
     load_velocity: Vec3  # [m/s]
 
 
-class LoadDrive(NamedTuple):
+class LoadInputs(NamedTuple):
     """Forces on the load over a communication step."""
 
     load: LoadPlant
@@ -71,7 +71,7 @@ def _slackens(c: Any, before: bool, sling: Sling, carrier: NeighbourState) -> bo
 
 
 @always_inline
-def pulls(p: LoadDrive, t: float, x: LoadMotion) -> Vec3:
+def pulls(p: LoadInputs, t: float, x: LoadMotion) -> Vec3:
     """Return the force [N] of the load on all cables at time t [s]."""
     total = (0.0, 0.0, 0.0)
     for force in map_tuple(_pull, (x, t - p.start), p.load.slings, p.carriers):
@@ -80,24 +80,24 @@ def pulls(p: LoadDrive, t: float, x: LoadMotion) -> Vec3:
 
 
 @always_inline
-def rate(p: LoadDrive, t: float, x: LoadMotion) -> LoadMotion:
+def rate(p: LoadInputs, t: float, x: LoadMotion) -> LoadMotion:
     """Return the tangent of the load (theory, eq. (1.23))."""
     air = Air(p.carriers[0].air_density, p.carriers[0].wind_world)
     return LoadMotion(x.load_velocity, load_acceleration(p.load.slings[0], p.load.field, air, pulls(p, t, x), x))
 
 
-RATES[LoadDrive] = rate
+RATES[LoadInputs] = rate
 
 
 @always_inline
-def _switches(p: LoadDrive, t: float, x: LoadMotion, h: float) -> bool:
+def _switches(p: LoadInputs, t: float, x: LoadMotion, h: float) -> bool:
     """Return True if a cable may slacken or the load may land within h [s]."""
     landing = lands(p.load.slings[0], x.load_position, x.load_velocity, h)
     return reduce_tuple(_slackens, (x, t - p.start, h), landing, p.load.slings, p.carriers)
 
 
 @kernel
-def move_load(p: LoadDrive, x: LoadMotion) -> LoadMotion:
+def move_load(p: LoadInputs, x: LoadMotion) -> LoadMotion:
     """Return the motion of the load a communication step later."""
     load = p.load
     for i in range(load.steps):
@@ -121,10 +121,10 @@ def step(
     """Advance the load to `tick` from its carriers' states of the previous tick; output it with the cables' force."""
     x, acceleration, force = s, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     if inputs[0].due:
-        drive = LoadDrive(p, map_tuple(_neighbour_state, 0.0, inputs, inputs), (tick - 1) * p.interval)
-        x = move_load(drive, x)
-        acceleration = rate(drive, tick * p.interval, x).load_velocity
-        force = scale(-1.0, pulls(drive, tick * p.interval, x))
+        u = LoadInputs(p, map_tuple(_neighbour_state, 0.0, inputs, inputs), (tick - 1) * p.interval)
+        x = move_load(u, x)
+        acceleration = rate(u, tick * p.interval, x).load_velocity
+        force = scale(-1.0, pulls(u, tick * p.interval, x))
     position, velocity, zero = x.load_position, x.load_velocity, ((0.0, 0.0, 0.0),)
     sample = NeighbourState(
         position, velocity, ZERO, p.slings[0].load_mass, 0.0, 0.0, 0.0, 0.0, ZERO, position, velocity, acceleration,

@@ -11,7 +11,7 @@ from lapwing.dynamics.lie.quaternion import Quaternion
 from lapwing.dynamics.vector import ZERO, Vec3
 from lapwing.dynamics.vehicles.rigid_body import RigidBody
 from lapwing.kernels import DispatchTable, always_inline
-from lapwing.kernels.codegen import generic
+from lapwing.kernels.codegen import dispatch, generic
 from lapwing.kernels.state_tree import finite
 from lapwing.papers.gyrostat import GyrostatParameters
 from lapwing.papers.quadrotor_os4 import Os4Parameters, Os4State
@@ -32,13 +32,8 @@ class AutonomousPlant(NamedTuple):
 
 
 OUTPUT_FUNCTIONS = DispatchTable()
-"""Function of `outputs_of` by class of a system's parameters."""
-
-
-@generic(inline=True)
-def outputs_of(p: types.Type, t: types.Type, x: types.Type) -> Any:
-    """Return the port values of state x at time t [s], by the class of the parameters p."""
-    return OUTPUT_FUNCTIONS[p.instance_class]
+"""The compiled function (p, t, x) -> port values of state x at time t [s], by class of a system's parameters p."""
+outputs_of = dispatch(OUTPUT_FUNCTIONS)
 
 
 @generic(inline=True)

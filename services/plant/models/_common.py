@@ -103,8 +103,8 @@ def noise_key(seed: int, vehicle: str) -> Key:
     return stream_key(seed, vehicle, "plant")
 
 
-def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceConfig:
-    """Return the configuration of a multirotor with parameters p and the state form of module `form`."""
+def multirotor_plant(scene: Scene, formulation: ModuleType, p: Any) -> ServiceConfig:
+    """Return the configuration of a multirotor with parameters p, as the module `formulation` describes it."""
     exchange, frame = scene[Communication], airframe(scene)
     zero = (0.0,) * len(frame.rotors.position)
     solver, steps, step = method(scene)
@@ -112,7 +112,8 @@ def multirotor_plant(scene: Scene, form: ModuleType, p: Any) -> ServiceConfig:
     settle = round(scene[Run].stop_delay * exchange.rate)
     p = with_tolerance(p, scene[Solver].contact_tolerance)
     core = MultirotorPlant(solver, p, key, step, steps, exchange.interval, zero, settle)
-    start = MultirotorPlantState(static_equilibrium(form, p, start_pose(scene), gravity(scene)), last_tick(scene))
+    at_rest = static_equilibrium(formulation, p, start_pose(scene), gravity(scene))
+    start = MultirotorPlantState(at_rest, last_tick(scene))
     truth = TrueState(
         rotor_speed=zero, motor_voltage=zero, motor_current=zero, motor_power=zero, rotor_thrust=zero, rotor_torque=zero
     )

@@ -41,7 +41,7 @@ from lapwing.services.plant.service_config import PlantConfig
 class CooperativePlant(NamedTuple):
     """Parameters of the block: the formation and its integration."""
 
-    formation: CooperativeLoadParameters  # its drive is replaced by the received command
+    formation: CooperativeLoadParameters  # its control is replaced by the received command
     method: Any  # `Method()` of an integrator
     steps: int  # per tick
     step: float  # [s]

@@ -6,7 +6,7 @@ from types import ModuleType
 from typing import Annotated, Any, ClassVar, Literal, NamedTuple
 
 from numba import types
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
@@ -14,8 +14,9 @@ from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects import _hooks as hooks
 from lapwing.dynamics.multibody.five_bodies import FiveBodies
+from lapwing.dynamics.validation import Table
 from lapwing.dynamics.vehicles import multirotor_euler, multirotor_multibody
-from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorParameters
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorParameters, StepInputs
 from lapwing.dynamics.vehicles.multirotor_multibody_equations import joints
 from lapwing.dynamics.vehicles.multirotor_stepper import BREAK_ROUNDING
 from lapwing.kernels import always_inline
@@ -52,9 +53,9 @@ def step(p: FiveBodiesView, s: Any, tick: int, inputs: tuple[InputSample, ...]) 
     actuators = inputs[0]
     command = actuators.value.motor_voltage if actuators.due else p.off
     g, memory = p.vehicle, s.vehicle.memory
-    drive = MultirotorDrive(g, hooks.all_mass_properties(g.effects, memory, g.body), memory, command)
+    u = StepInputs(g, hooks.all_mass_properties(g.effects, memory, g.body), memory, command)
     x = on_se3(s.vehicle.motion)
-    j = joints(drive, tick * p.interval, x)
+    j = joints(u, tick * p.interval, x)
     a, (b, c, d, e) = x.chassis, x.propellers
     sample = BodyMotions(
         (a.position_world, b.position_world, c.position_world, d.position_world, e.position_world),
@@ -69,13 +70,12 @@ def step(p: FiveBodiesView, s: Any, tick: int, inputs: tuple[InputSample, ...]) 
 
 NAMES = ("chassis", *[f"propeller{k + 1}" for k in range(4)])
 LARGEST_TURN = 0.5  # [rad] of a propeller in a step of the redundant coordinates
-FORM = {"se3": multirotor_multibody, "euler": multirotor_euler}
+FORMULATIONS = {"se3": multirotor_multibody, "euler": multirotor_euler}
 
 
-class Event(BaseModel):
+class Event(Table):
     """Failure of a propeller in flight, at `time`."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
     time: float = Field(ge=0.0)  # [s] moment of the failure
     propeller: int = Field(ge=1, le=4)  # in the order of the airframe
     failure: Literal["locked", "free", "torn_off"]  # locked to the chassis, disconnected from its motor, or torn off
@@ -134,10 +134,10 @@ def longest_step(scene: Scene) -> float:
 
 
 def describe(scene: Scene) -> tuple[ModuleType, Any]:
-    """Return the module of the state form, and the parameters."""
+    """Return the module of the formulation, and the parameters."""
     s = _settings(scene)
-    form = FORM[s.coordinates]
-    return form, form.parameters(airframe(scene), active(scene), s.drive, s.stabilisation)
+    formulation = FORMULATIONS[s.coordinates]
+    return formulation, formulation.parameters(airframe(scene), active(scene), s.drive, s.stabilisation)
 
 
 def _event(scene: Scene, event: Event) -> PlantEvent:
@@ -147,8 +147,8 @@ def _event(scene: Scene, event: Event) -> PlantEvent:
 
 def resolve(scene: Scene) -> ServiceConfig:
     """Return the configuration of a multirotor of five bodies, with its failures."""
-    form, p = describe(scene)
-    result = multirotor_plant(scene, form, p)
+    formulation, p = describe(scene)
+    result = multirotor_plant(scene, formulation, p)
     events = tuple(_event(scene, event) for event in sorted(_settings(scene).event, key=lambda event: event.time))
     plant = result.parameters
     view = FiveBodiesView(p, plant.core.interval, plant.core.off)
@@ -156,7 +156,7 @@ def resolve(scene: Scene) -> ServiceConfig:
         model="multibody",
         bodies=view,
         events=events,
-        euler=form is multirotor_euler,
+        euler=formulation is multirotor_euler,
         encoding=plant.encoding._replace(bodies=NAMES),
     )
     return result._replace(parameters=parameters, ports=(*result.ports, bodies_port(scene, len(NAMES))))

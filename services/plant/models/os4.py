@@ -3,11 +3,12 @@
 import math
 from typing import ClassVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import Field
 
 from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
+from lapwing.dynamics.validation import Table
 from lapwing.dynamics.vector import ZERO
 from lapwing.papers.quadrotor_os4 import Os4Motors, Os4Parameters, Os4State
 from lapwing.services.common.ports import TrueState
@@ -18,10 +19,9 @@ RPM = 2.0 * math.pi / 60.0  # [rad/s]
 Four = tuple[float, float, float, float]  # per rotor: front +x, left +y, rear -x, right -y
 
 
-class Motors(BaseModel):
+class Motors(Table):
     """Four equal motors."""
 
-    model_config = ConfigDict(extra="forbid", frozen=True, strict=True, allow_inf_nan=False)
     voltage: Four = Field(strict=False)  # [V] of each motor
     constant: float = Field(gt=0.0)  # [N m/A] = [V s/rad], referred to the rotor's side of the gear
     resistance: float = Field(gt=0.0)  # [ohm] of a motor's winding

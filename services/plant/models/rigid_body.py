@@ -22,7 +22,7 @@ def check(scene: Scene) -> None:
 
 
 def describe(scene: Scene) -> tuple[ModuleType, Any]:
-    """Return the module of the state form, and the parameters."""
+    """Return the module of the formulation, and the parameters."""
     return multirotor, multirotor.parameters(airframe(scene), active(scene))
 
 

@@ -100,7 +100,7 @@ def check(scene: Scene) -> None:
 
 
 def describe(scene: Scene) -> tuple[ModuleType, Any]:
-    """Return the module of the state form, and the parameters."""
+    """Return the module of the formulation, and the parameters."""
     return multirotor_slung, multirotor_slung.parameters(airframe(scene), _sling(scene), active(scene))
 
 

@@ -3,18 +3,19 @@
 from typing import Annotated
 
 from annotated_types import Gt
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import ConfigDict, Field
 
+from lapwing.dynamics.validation import Table
 from lapwing.services.trajectory.polynomial_piece import Piece
 
 Finite = Annotated[float, Field(allow_inf_nan=False)]
 Positive = Annotated[Finite, Gt(0.0)]
 
 
-class Segment(BaseModel):
+class Segment(Table):
     """A part of one channel; values are displacements from the origin in u = m (x, y, z) or rad (yaw)."""
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+    model_config = ConfigDict(strict=False)
 
     @classmethod
     def kind_name(cls) -> str:

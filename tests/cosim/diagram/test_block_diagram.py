@@ -125,12 +125,12 @@ def messages(batches):
 def test_record_batches_are_equal_for_any_length():
     def flown(stops):
         diagram = graph_of(readings(end=50), encoders=[encoder(), encoder(COMMAND_ACKS, 4)], kept_ticks=64)
-        pages = []
+        batches = []
         for stop in stops:
             first = diagram.tick
             diagram.advance(stop)
-            pages += diagram.record_batches(first, diagram.tick)
-        return messages(pages)
+            batches += diagram.record_batches(first, diagram.tick)
+        return messages(batches)
 
     whole = flown([64])
     assert [len(whole[topic.name]) for topic in (SETPOINT, COMMAND_ACKS)] == [51, 13]

@@ -47,10 +47,10 @@ def test_coupled_blocks_share_execution_group():
 
 @pytest.mark.parametrize("together", TOGETHER.values(), ids=TOGETHER)
 @pytest.mark.parametrize("last", [(7, 9), (9, 7), (3, 9), (9, 3)])
-@pytest.mark.parametrize("pages", [(100,), (4, 8, 12), range(1, 20)])
-def test_run_ends_with_last_vehicle_at_equal_ticks(last, pages, together):
+@pytest.mark.parametrize("stops", [(100,), (4, 8, 12), range(1, 20)])
+def test_run_ends_with_last_vehicle_at_equal_ticks(last, stops, together):
     diagram = graph_of(*counters(together, a=Counter(last[0]), b=Counter(last[1])), kept_ticks=16)
-    for stop in pages:
+    for stop in stops:
         diagram.advance(stop)
     assert (diagram.ended, diagram.tick) == (True, 10)
     assert counted(diagram, "a", "b") == [list(range(2, 10))] * 2

@@ -179,7 +179,7 @@ def test_ticks_at_which_message_is_due(first, stop, period, ticks):
 
 
 @pytest.mark.parametrize("stops", [[30], [1, 2, 7, 8, 9, 30], list(range(1, 31))])
-def test_message_at_every_change_for_any_length_of_pages(stops):
+def test_message_at_every_change_for_any_length_of_batches(stops):
     rows = np.zeros((30, 2))
     rows[7:9, 0], rows[20:, 1] = 1.0, 3.0  # changes at the ticks 7, 9 and 20
     encoder = TopicEncoder(SETPOINT, "status", 10, dict, dict, on_change=True)

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from collections import Counter
 from types import SimpleNamespace
 
 import pytest
@@ -15,9 +16,10 @@ from lapwing.cosim.processes.patience import (
     QUIET,
     Patience,
     Starvation,
+    growth,
     machine_stall_time,
     process_state,
-    starved_time,
+    starved_times,
 )
 from lapwing.cosim.processes.run_monitor import LONGEST, RunMonitor
 
@@ -51,9 +53,9 @@ def start():
 
 
 def measured(pid, seconds=1.5):
-    before = starved_time(pid)
+    before = starved_times(pid)
     time.sleep(seconds)
-    return starved_time(pid) - before
+    return growth(starved_times(pid), before)
 
 
 @pytest.mark.long
@@ -72,7 +74,22 @@ def test_only_starved_process_extends_wait(start):
 def test_exited_process_has_no_waiting_time():
     child = subprocess.Popen([sys.executable, "-c", ""])
     child.wait()
-    assert starved_time(child.pid) == 0.0
+    assert not starved_times(child.pid)
+
+
+def test_ended_thread_hides_no_waiting_time_of_others(monkeypatch):
+    times, now = Counter({1: 8_000_000_000, 2: 30_000_000_000}), [0.0]
+    monkeypatch.setattr("lapwing.cosim.processes.patience.starved_times", lambda pid: times.copy())
+    monkeypatch.setattr("lapwing.cosim.processes.patience.machine_stall_time", lambda: 0.0)
+    patience = Patience(4.0, clock=lambda: now[0])
+    now[0] = 3.0
+    assert not patience.over
+    del times[2]
+    times[1] += 6_000_000_000
+    now[0] = 9.9
+    assert not patience.over
+    now[0] = 10.1
+    assert patience.over
 
 
 def test_stall_of_machine_sums_its_counts(monkeypatch, tmp_path):
@@ -86,19 +103,20 @@ def test_stall_of_machine_sums_its_counts(monkeypatch, tmp_path):
 
 
 def test_starvation_counts_from_last_message(monkeypatch):
-    times = {1: 5.0, 2: 7.0}
+    times = {1: Counter({1: 5_000_000_000}), 2: Counter({2: 7_000_000_000})}
     stall = [100.0]
-    monkeypatch.setattr("lapwing.cosim.processes.patience.starved_time", times.__getitem__)
+    monkeypatch.setattr("lapwing.cosim.processes.patience.starved_times", lambda pid: times[pid].copy())
     monkeypatch.setattr("lapwing.cosim.processes.patience.machine_stall_time", lambda: stall[0])
     starvation, pids = Starvation(), {"plant": 1, "sensors": 2}
     starvation.look(pids, 0.0)
     assert starvation.of(pids) == 0.0
     starvation.look(pids, QUIET)
-    times[1], times[2] = 6.0, 7.5
+    times[1][1] += 1_000_000_000
+    times[2][2] += 500_000_000
     starvation.look(pids, 2 * QUIET)
     assert starvation.of(pids) == 1.5
     assert starvation.of(["plant", "somewhere else"]) == 1.0
-    times[2] = 0.0  # another process of this name has replaced it
+    times[2] = Counter()  # it has ended
     assert starvation.of(["sensors"]) == 0.0
     stall[0] = 102.0  # the machine waited for its disk
     assert starvation.of(["sensors"]) == 2.0

@@ -3,6 +3,7 @@
 import io
 import os
 import re
+from collections import Counter
 from types import SimpleNamespace
 
 import pytest
@@ -42,7 +43,7 @@ class Run:
         self.now = 100.0
         monkeypatch.setattr("lapwing.cosim.processes.run_monitor.time.monotonic", lambda: self.now)
         # on a busy machine, the starvation of this process would extend the fake times
-        monkeypatch.setattr("lapwing.cosim.processes.patience._scheduled", lambda pid: (0.0, 0.0))
+        monkeypatch.setattr("lapwing.cosim.processes.patience._scheduled", lambda *_: Counter())
         monkeypatch.setattr("lapwing.cosim.processes.patience.machine_stall_time", lambda: 0.0)
         self.monitor = RunMonitor(bus, PublisherIds("test"), NAMES)
         self.monitor.poll = self.pass_time
@@ -55,6 +56,10 @@ class Run:
 
     def pass_time(self, seconds):
         self.now += seconds
+
+    def times(self, share):
+        """Return the times of a process whose only thread has waited, or run, for a share of the time."""
+        return Counter({0: round(1e9 * share * self.now)})
 
     def start(self):
         self.update()
@@ -189,11 +194,11 @@ def test_optional_process_may_finish_while_there_are_news(run):
     assert run.state is RunState.ENDING
 
 
-@pytest.mark.parametrize("measure", ["starved_time", "cpu_time"])
+@pytest.mark.parametrize("measure", ["starved_times", "cpu_times"])
 def test_busy_optional_process_is_killed_after_a_minute(monkeypatch, measure):
     run = Run(monkeypatch)
     run.processes["mavlink"].pid = 1 << 29
-    monkeypatch.setattr(f"lapwing.cosim.processes.patience.{measure}", lambda pid: run.now if pid == 1 << 29 else 0.0)
+    monkeypatch.setattr(f"lapwing.cosim.processes.patience.{measure}", lambda pid: run.times(pid == 1 << 29))
     run.start()
     run.monitor.ended, run.monitor.outcome = True, ""
     run.update_for(LONGEST - 1.0)
@@ -207,9 +212,7 @@ def test_busy_optional_process_is_killed_after_a_minute(monkeypatch, measure):
 def test_starved_launcher_reports_no_stall(monkeypatch):
     run = Run(monkeypatch)
     own = os.getpid()
-    monkeypatch.setattr(
-        "lapwing.cosim.processes.patience.starved_time", lambda pid: 0.9 * run.now if pid == own else 0.0
-    )
+    monkeypatch.setattr("lapwing.cosim.processes.patience.starved_times", lambda pid: run.times(0.9 * (pid == own)))
     run.start().update_for(15.0)
     assert run.state is RunState.RUNNING
     assert not run.processes["mavlink"].killed

@@ -13,7 +13,7 @@ from lapwing.dynamics.lie.quaternion import Quaternion
 from lapwing.dynamics.validation import fault
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import Airframe
-from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, MultirotorDrive, evaluate
+from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, StepInputs, evaluate
 from lapwing.kernels import python_function
 
 pytestmark = pytest.mark.usefixtures("uncompiled")
@@ -49,8 +49,8 @@ def loads_in_flight(frame, tables, turn=(0.2, -0.3, 0.5), velocity=(4.0, -2.0, 1
     R = Rotation.from_rotvec(turn)
     attitude = Quaternion(*map(float, R.as_quat(scalar_first=True)))
     motion = Motion((0.0, 0.0, 50.0), attitude, tuple(velocity), tuple(map(float, omega)), SPEED)
-    drive = MultirotorDrive(p, p.body, multirotor.initial_state(p).memory, VOLTAGE)
-    _, rotors, force, torque = python_function(evaluate)(drive, 0.0, motion)
+    u = StepInputs(p, p.body, multirotor.initial_state(p).memory, VOLTAGE)
+    _, rotors, force, torque = python_function(evaluate)(u, 0.0, motion)
     return FlightLoads(R.inv().apply(force), np.array(torque), *map(np.array, rotors[:3]))
 
 

@@ -9,7 +9,7 @@ from lapwing.dynamics import effects
 from lapwing.dynamics.atmosphere import Atmosphere
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.effects.battery import open_circuit_voltage
-from lapwing.dynamics.effects.battery_thevenin import battery_thevenin, discharge, read, switch
+from lapwing.dynamics.effects.battery_thevenin import battery_thevenin, discharge, switch
 from lapwing.dynamics.environment import Environment
 
 OHMIC = 12 * 0.002  # [ohm] of the drone's pack
@@ -68,7 +68,8 @@ def test_temperature_converges_to_thermal_balance(drone, situation, rotors):
     assert e.initial_discrete_state()[1] == pytest.approx(kelvin, abs=0.01)
     memory = after_current(e, e.initial_discrete_state(), situation, rotors, 40.0, 300.0, 1.0)
     rise = OHMIC * 40.0**2 * 1800.0 / 3000.0 * (1.0 - math.exp(-300.0 / 1800.0))
-    assert read.py_func(e, memory, 0.0)[3] - e.initial_discrete_state()[1] == pytest.approx(rise, rel=1e-9)
+    _, (_, _, _, temperature) = battery_thevenin.py_func(e, memory, 0.0)
+    assert temperature - e.initial_discrete_state()[1] == pytest.approx(rise, rel=1e-9)
 
 
 def test_cold_pack_has_higher_resistance(drone):
@@ -76,7 +77,8 @@ def test_cold_pack_has_higher_resistance(drone):
     for kelvin in (263.15, 298.15):
         e = make(drone, temperature=kelvin, transient_resistance=[0.0, 0.0], heat_capacity=1e6)
         memory = e.initial_discrete_state()
-        drop = e.cells * open_circuit_voltage(memory[0]) - read.py_func(e, memory, 20.0 * loaded(e, memory, 20.0))[1]
+        voltage, _ = battery_thevenin.py_func(e, memory, 20.0 * loaded(e, memory, 20.0))
+        drop = e.cells * open_circuit_voltage(memory[0]) - voltage
         assert drop / (OHMIC * 20.0) == pytest.approx(math.exp(2400 * (1 / kelvin - 1 / 298.15)), rel=1e-6)
     assert math.exp(2400 * (1 / 263.15 - 1 / 298.15)) == pytest.approx(2.9, abs=0.05)
 
@@ -85,10 +87,10 @@ def test_cutoff_has_hysteresis(drone, situation, rotors):
     e = make(drone, initial_charge=0.1, cutoff_voltage=3.5, restart=3.6, **COLD)
     memory = after_current(e, e.initial_discrete_state(), situation, rotors, 100.0, 0.1)
     assert memory[4] == 0.0
-    assert battery_thevenin.py_func(e, memory, 0.0) == 0.0
+    assert battery_thevenin.py_func(e, memory, 0.0)[0] == 0.0
     later = after_current(e, memory, situation, rotors, 0.0, 300.0, 1.0)
     assert later[4] == 1.0
-    assert battery_thevenin.py_func(e, later, 0.0) > 12 * 3.6
+    assert battery_thevenin.py_func(e, later, 0.0)[0] > 12 * 3.6
     final = make(drone, initial_charge=0.1, cutoff_voltage=3.5, **COLD)
     assert after_current(final, memory, situation, rotors, 0.0, 300.0, 1.0)[4] == 0.0
 

@@ -16,7 +16,7 @@ from lapwing.dynamics.lie.quaternion import exp
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.inflow import thrust_in_wake
-from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, evaluate
+from lapwing.dynamics.vehicles.multirotor_equations import StepInputs, evaluate
 from lapwing.kernels import python_function
 
 pytestmark = pytest.mark.usefixtures("uncompiled")
@@ -153,8 +153,8 @@ def loads(frame, tables, velocity=(0.0, 0.0, 0.0), speeds=(300.0,) * 8, turn=(0.
     p = multirotor.parameters(frame, effects.from_scene(tables, frame))
     state = multirotor.initial_state(p, (0.0, 0.0, 50.0), exp(turn), 0.0, velocity)
     motion = state.motion._replace(rotor_speed=speeds)
-    drive = MultirotorDrive(p, p.body, state.memory, (0.0,) * 8)
-    rotors = python_function(evaluate)(drive, 0.0, motion)[1]
+    u = StepInputs(p, p.body, state.memory, (0.0,) * 8)
+    rotors = python_function(evaluate)(u, 0.0, motion)[1]
     return np.array(rotors.thrust), np.array(rotors.torque)
 
 

@@ -106,7 +106,7 @@ def test_inflow_rate_follows_apparent_mass(drone, situation, rotors):
     mass = 0.637 * 4 / 3 * math.pi * (0.5 * drone.propeller.diameter) ** 3
     rate = (4 * e.area * hover + e.slope * SPEED) / mass
     assert follow.py_func(e, (hover + 1e-4,) * 4, s, rotors()) == pytest.approx([-1e-4 * rate] * 4, rel=1e-3)
-    assert fastest_approach.py_func(e, (), s.layout) > rate
+    assert fastest_approach.py_func(e, (), s.motion, s.body, s.layout) > rate
 
 
 def test_inflow_follows_speed_of_each_hub(drone, situation, rotors):

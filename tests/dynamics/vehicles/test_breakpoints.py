@@ -12,7 +12,7 @@ from lapwing.dynamics.integrators import get
 from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import load_airframe
-from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, MultirotorDrive
+from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, StepInputs
 from lapwing.studies.accuracy.coordinates import error, of_state
 from lapwing.studies.accuracy.reference import dop853
 from lapwing.studies.accuracy.systems.multirotor import START, VOLTAGE, right_hand_side
@@ -54,7 +54,7 @@ def broken_by_reference(p):
         (RELEASE - DAMAGE, box.loaded, torn),
         (END - RELEASE, box.empty, torn),
     ):
-        part = MultirotorDrive(p._replace(effects=(gravity, blades), body=body), body, (), VOLTAGE)
+        part = StepInputs(p._replace(effects=(gravity, blades), body=body), body, (), VOLTAGE)
         y = dop853(lambda t, x, part=part: right_hand_side(part, x), y, seconds)
     return y
 

@@ -13,7 +13,7 @@ from lapwing.dynamics.lie.quaternion import NO_ROTATION, exp
 from lapwing.dynamics.noise import stream_key
 from lapwing.dynamics.vehicles import multirotor, multirotor_equations, multirotor_multibody
 from lapwing.dynamics.vehicles.airframe import load_airframe
-from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive
+from lapwing.dynamics.vehicles.multirotor_equations import StepInputs
 from lapwing.dynamics.vehicles.multirotor_multibody_equations import joints
 from lapwing.kernels import kernel
 from tests.combinations import rest_nightly
@@ -98,7 +98,7 @@ def test_uneven_propellers_wobble_at_twice_their_speed():
 
 @kernel
 def hinges(p, state, volts):
-    return joints(MultirotorDrive(p, p.body, state.memory, volts), 0.0, state.motion)
+    return joints(StepInputs(p, p.body, state.memory, volts), 0.0, state.motion)
 
 
 @pytest.mark.long

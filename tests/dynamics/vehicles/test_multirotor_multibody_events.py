@@ -17,7 +17,7 @@ from lapwing.dynamics.vehicles import (
     multirotor_multibody_equations,
 )
 from lapwing.dynamics.vehicles.airframe import load_airframe
-from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive
+from lapwing.dynamics.vehicles.multirotor_equations import StepInputs
 from lapwing.dynamics.vehicles.multirotor_multibody import BECOMES
 from lapwing.dynamics.vehicles.multirotor_multibody_equations import joints
 from lapwing.dynamics.vehicles.propeller_failures import Failure, advance_through
@@ -30,7 +30,7 @@ DRONE = load_airframe(Path(__file__).parents[3] / "lapwing/scenes/vehicles/deliv
 RK4 = get("rk4_renormalised").Method()
 VOLTS, SPEED = (25.0, 27.0, 24.0, 28.0), 200.0
 VELOCITY, OMEGA, ATTITUDE = (1.0, -2.0, 0.5), (0.6, -0.4, 0.3), exp((0.1, -0.2, 0.3))
-FORMS = {"se3": multirotor_multibody, "euler": multirotor_euler}
+FORMULATIONS = {"se3": multirotor_multibody, "euler": multirotor_euler}
 H, N = 5e-4, 4
 IZ = DRONE.rotors.inertia
 
@@ -48,18 +48,18 @@ def motion_from(p, x):
 @kernel
 def apply_impulse(p, state, volts):
     return multirotor_multibody_equations.apply_constraint_impulse(
-        MultirotorDrive(p, p.body, state.memory, volts), state.motion
+        StepInputs(p, p.body, state.memory, volts), state.motion
     )
 
 
 @kernel
 def apply_euler_impulse(p, state, volts):
-    return multirotor_euler.apply_constraint_impulse(MultirotorDrive(p, p.body, state.memory, volts), state.motion)
+    return multirotor_euler.apply_constraint_impulse(StepInputs(p, p.body, state.memory, volts), state.motion)
 
 
 @kernel
 def hinges(p, x, volts):
-    return joints(MultirotorDrive(p, p.body, (), volts), 0.0, x)
+    return joints(StepInputs(p, p.body, (), volts), 0.0, x)
 
 
 def bodies(x):
@@ -91,18 +91,18 @@ def fly(p, state, ticks, begin=0, volts=VOLTS, finer=1):
 
 
 def before(coordinates, drive):
-    form = FORMS[coordinates]
-    p = form.parameters(DRONE, (), drive)
-    start = form.initial_state(p, (0.0, 0.0, 0.0), ATTITUDE, SPEED, VELOCITY, OMEGA)
-    return form, p, start, fly(p, start, 10)
+    formulation = FORMULATIONS[coordinates]
+    p = formulation.parameters(DRONE, (), drive)
+    start = formulation.initial_state(p, (0.0, 0.0, 0.0), ATTITUDE, SPEED, VELOCITY, OMEGA)
+    return formulation, p, start, fly(p, start, 10)
 
 
-@pytest.mark.parametrize("coordinates", FORMS)
+@pytest.mark.parametrize("coordinates", FORMULATIONS)
 @pytest.mark.parametrize("drive", rest_nightly("torque", "speed"))
 @pytest.mark.parametrize("becomes", BECOMES)
 def test_momentum_is_kept_across_event(coordinates, drive, becomes):
-    form, p, start, state = before(coordinates, drive)
-    after = form.with_propeller_failure(p, 1, becomes)
+    formulation, p, start, state = before(coordinates, drive)
+    after = formulation.with_propeller_failure(p, 1, becomes)
     kept = momenta(p, state.motion)
     assert np.abs(kept - momenta(p, start.motion)).max() < 1e-7
     if becomes == "locked":
@@ -152,8 +152,8 @@ def test_free_propeller_keeps_its_spin_without_air(drive):
 def test_torn_off_propeller_has_no_constraint_rows(coordinates, drive):
     """The propeller flies straight and keeps its spin without a hinge force; the others are held. In the baseline,
     a propeller without thrust, it stays in its place."""
-    form, p, _, state = before(coordinates, drive)
-    after = form.with_propeller_failure(p, 1, "torn_off")
+    formulation, p, _, state = before(coordinates, drive)
+    after = formulation.with_propeller_failure(p, 1, "torn_off")
     if coordinates == "euler":
         arrays = after.layout.bodies.arrays
         assert (len(arrays.joint_bodies), len(arrays.drive_bodies)) == (3, 3)
@@ -175,15 +175,15 @@ def test_torn_off_propeller_has_no_constraint_rows(coordinates, drive):
     ]
     assert np.abs([gap[k] for k in (0, 2, 3)]).max() < 1e-10
     assert np.abs(gap[1]).max() > 1e-4
-    baseline = bodies(fly(form.with_propeller_failure(p, 1, "free"), state, 20, 10).motion)
+    baseline = bodies(fly(formulation.with_propeller_failure(p, 1, "free"), state, 20, 10).motion)
     assert np.abs(np.subtract(baseline[2].position_world, straight)).max() > 1e-4
 
 
 def test_detachment_is_equal_in_both_coordinates():
     ends = []
-    for coordinates in FORMS:
-        form, p, _, state = before(coordinates, "torque")
-        ends.append(bodies(fly(form.with_propeller_failure(p, 1, "torn_off"), state, 10, 10).motion))
+    for coordinates in FORMULATIONS:
+        formulation, p, _, state = before(coordinates, "torque")
+        ends.append(bodies(fly(formulation.with_propeller_failure(p, 1, "torn_off"), state, 10, 10).motion))
     for one, other in zip(*ends, strict=True):
         np.testing.assert_allclose(one.position_world, other.position_world, atol=1e-8)
         np.testing.assert_allclose(rotation_matrix(one.attitude), rotation_matrix(other.attitude), atol=1e-5)
@@ -205,7 +205,7 @@ EFFECTS = effects.from_scene({"gravity": {}, "rotor_thrust": {}}, DRONE)
 
 @kernel
 def rate_of_bodies(p, x, memory, volts):
-    return multirotor_multibody_equations.rate(MultirotorDrive(p, p.body, memory, volts), 0.0, x)
+    return multirotor_multibody_equations.rate(StepInputs(p, p.body, memory, volts), 0.0, x)
 
 
 def coordinates_of(x):

@@ -12,6 +12,7 @@ from lapwing.flights.log_import.recording import Recording
 from lapwing.flights.log_import.ulog_flight import read_ulog_flight
 from lapwing.flights.log_import.write_log import write_log
 from lapwing.studies.validation.plant_rows import PlantRows
+from tests.combinations import rest_nightly
 from tests.commands import assert_rejected, run_command
 from tests.fuzz.flights import dataflash
 
@@ -63,14 +64,15 @@ def broken(path, text):
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("name", "content", "message"),
-    [
+    rest_nightly(
         ("flight.ulg", b"no log", "is not a readable ULog file"),
         ("flight.csv", b"a,b\n1,2\n", "none of the mapped columns"),
         ("flight.csv.gz", b"no gzip", "cannot be read: not a gzipped file (b'no'); expected a table (.csv, .csv.gz)"),
         ("flight.csv.gz", gzip.compress(bytes(17_000_000)), "unpacks to over 16 MB"),
         ("flight.txt", b"1 2 3", "unknown format"),
         ("flight.mcap", b"\x89MCAP0\r\n", "is not a readable rosbag2"),
-    ],
+        keep=3,
+    ),
 )
 def test_command_rejects_unreadable_files(tmp_path, name, content, message):
     path, out = broken(tmp_path / name, content), tmp_path / "out.mcap"

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 from small_fmu import write_small_fmu
 
+from tests.combinations import rest_nightly
 from tests.commands import assert_rejected, run_command
 
 pytest.importorskip("fmpy")
@@ -59,7 +60,7 @@ def assert_fmu_rejected(folder: Path, message: str) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("change", "message"),
-    [
+    rest_nightly(
         (without(XML), "has no file modelDescription.xml; expected an FMU"),
         (without(LIBRARY), "has binaries for no platform; expected an FMU for Linux on x86-64"),
         (with_file(LIBRARY, on_arm), f"{LIBRARY} is not a library for x86-64"),
@@ -73,7 +74,8 @@ def assert_fmu_rejected(folder: Path, message: str) -> None:
         (with_file("../evil.so", lambda _: b"x"), "file '../evil.so' is outside the FMU"),
         (with_file("/tmp/evil.so", lambda _: b"x"), "file '/tmp/evil.so' is outside the FMU"),
         (with_file("resources\\a", lambda _: b"x"), "is outside the FMU"),
-    ],
+        keep=3,
+    ),
 )
 def test_hostile_fmu_is_rejected_in_one_line(
     tmp_path: Path, files: Files, change: Callable[[Files], Files], message: str

@@ -16,6 +16,7 @@ from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.fmi.export.exported_part import export_part
 from lapwing.fmi.export.variables import variables_of
 from lapwing.services import scene_resolver
+from tests.combinations import rest_nightly
 from tests.commands import assert_rejected, run_command
 
 HOVER = Path("lapwing/scenes/hover.toml").resolve()
@@ -196,7 +197,7 @@ def test_exported_plant_has_named_inputs(folder: Path) -> None:
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("outputs", "message"),
-    [
+    rest_nightly(
         ('"effect.batery.voltage" = "supply"', "unknown effect 'batery'; did you mean battery?"),
         ('"effect.battery.volts" = "supply"', "unknown column 'effect.battery.volts'"),
         ('"effect.battery.voltage" = "wind_x"', "wind_x is in m/s, but effect.battery.voltage is in V"),
@@ -204,7 +205,8 @@ def test_exported_plant_has_named_inputs(folder: Path) -> None:
         ('"effect.gravity.acceleration" = "supply"', "the effect gravity has no named inputs"),
         ('"effect.battery" = "supply"', "supply has 1 elements, but effect.battery has 2"),
         ('"effect" = "supply"', "unknown port 'effect'"),
-    ],
+        keep=3,
+    ),
 )
 def test_invalid_effect_input_is_rejected_in_one_line(folder: Path, outputs: str, message: str) -> None:
     assert_rejected(

@@ -94,7 +94,7 @@ def test_gain_changes_flight_and_resimulation_repeats_it(folder: Path, plain_log
     assert "is identical" in done.stdout
 
 
-@pytest.mark.long
+@pytest.mark.nightly
 def test_accuracy_is_measured_with_permission(folder: Path) -> None:
     """`check --accuracy` of a scene and of its log."""
     scene, log = scene_with(folder), folder / "checked.mcap"

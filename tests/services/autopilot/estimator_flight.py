@@ -8,20 +8,19 @@ import numpy as np
 from lapwing.dynamics.environment import STANDARD
 from lapwing.dynamics.lie import quaternion
 from lapwing.dynamics.noise import TURN_ON, normal3, stream_key
-from lapwing.dynamics.terrain import LEVEL
-from lapwing.dynamics.vector import cross, norm, scale
+from lapwing.dynamics.vector import ZERO, cross, norm, scale
 from lapwing.kernels import always_inline, kernel
 from lapwing.services.autopilot import estimator
 from lapwing.services.sensors import barometer, gps, imu, magnetometer, sonar
 from lapwing.services.sensors.delay_line import Fault
 from lapwing.services.sensors.fault_schedule import SLOTS
 from lapwing.services.sensors.schema import sensors
-from lapwing.services.sensors.sensor_inputs import Truth
+from lapwing.services.sensors.sensor_inputs import Rotors, Truth
 
 INTERVAL = 0.004  # [s]
 STAND = 3.0  # [s] at rest on the ground before the flight
 REST = 0.35  # [m] height of the body's origin on the ground
-HOME, AIR, FIELD = STANDARD.home, STANDARD.atmosphere, STANDARD.magnetic_field_world
+ENVIRONMENT, ROTORS = STANDARD._replace(gravity=9.81), Rotors()
 THETA, V, P = slice(0, 3), slice(3, 6), slice(6, 9)  # columns of the error: rotation vector, velocity, position
 NIS, HEALTH, REJECTED, COVARIANCE = 9, 15, 16, 17
 COLUMNS = COVARIANCE + 81
@@ -68,18 +67,12 @@ def truth_at(t, agility):
         (x[1], y[1], z[1]),
         omega,
         (x[2], y[2], z[2]),
+        ZERO,
         REST + z[0],
-        9.81,
-        HOME,
-        AIR,
-        FIELD,
-        LEVEL,
-        (0.0, 0.0, 0.0),
-        0.0,
         (x[1], y[1], z[1]),
         1.225,
-        0.0,
-        0.0,
+        ROTORS,
+        ENVIRONMENT,
     )
 
 

@@ -8,7 +8,7 @@ import pytest
 
 from lapwing.dynamics import effects
 from lapwing.dynamics.vehicles import multirotor
-from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, evaluate
+from lapwing.dynamics.vehicles.multirotor_equations import StepInputs, evaluate
 from lapwing.kernels import python_function
 from lapwing.services.autopilot import controller_parameters
 from lapwing.services.autopilot.allocation import virtual_control_effectiveness
@@ -41,8 +41,8 @@ def wrench(scene, thrust):
     state = multirotor.initial_state(p, (0.0, 0.0, 50.0))
     speeds = tuple(map(float, np.sqrt(np.asarray(thrust) / nominal.motor.thrust_coefficient)))
     motion = state.motion._replace(rotor_speed=speeds)
-    drive = MultirotorDrive(p, p.body, state.memory, (0.0,) * len(speeds))
-    _, _, force, torque = python_function(evaluate)(drive, 0.0, motion)
+    u = StepInputs(p, p.body, state.memory, (0.0,) * len(speeds))
+    _, _, force, torque = python_function(evaluate)(u, 0.0, motion)
     return np.array([force[2], *torque])
 
 

@@ -5,6 +5,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 
 import pytest
 from betaflight_peer import Peer, free_ports
@@ -57,6 +58,34 @@ z = {{ kind = "minimum_jerk", to = 1.0, duration = 1.5 }}
 """
 
 
+FIRMWARE = """
+# Its first start accepts no connection, its second one is configured.
+import socket
+import sys
+import time
+from pathlib import Path
+from betaflight_peer import Peer
+
+first, starts = int(sys.argv[1]), Path("starts")
+count = len(starts.read_text()) if starts.exists() else 0
+starts.write_text("x" * (count + 1))
+if count < 2:
+    server = socket.socket()
+    server.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
+    server.bind(("127.0.0.1", first + 3))
+    server.listen()
+    if count == 0:
+        time.sleep(600.0)
+    client, data = server.accept()[0], b""
+    while data != b"save\\n":
+        client.sendall(b"# ")
+        data = client.recv(4096)
+else:
+    with Peer(first):
+        time.sleep(600.0)
+"""
+
+
 def options(first, **keys):
     keys = {"port": first, "start_timeout": 300.0, "step_timeout": 300.0} | keys
     return [part for key, value in keys.items() for part in ("--set", f"autopilot.{key}={value}")]
@@ -99,6 +128,20 @@ def test_stalled_firmware_is_reported_and_log_readable(tmp_path):
     assert done.returncode == 1
     assert ": no motor outputs for 4 s at t = " in done.stderr
     assert len(Flight.read(log).truth) > 10
+
+
+@pytest.mark.long
+def test_firmware_whose_command_line_does_not_answer_is_started_again(tmp_path, monkeypatch):
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(Path.cwd()), str(Path(__file__).parent)]))
+    (tmp_path / "firmware.py").write_text(FIRMWARE)
+    first, log = free_ports(), tmp_path / "flight.mcap"
+    command = f'["{sys.executable}", "firmware.py", "{first}"]'
+    done = lapwing("run", "betaflight_quad", "--log", log, "--set", "run.duration=1",
+                   *options(first, command=command, directory=f'"{tmp_path}"', repeatable="false"))  # fmt: skip
+    assert "betaflight: 501 steps" in done.stdout, done.stderr
+    with LogReader(log) as read:
+        note = "started again: betaflight: no answer to '#' of its command line within 15 s"
+        assert read.metadata["firmware_notes"] == note
 
 
 @pytest.mark.long

@@ -1,6 +1,7 @@
 """Scripted replacement of PX4 for complete runs: accepts a mission, arms, climbs to 2 m, descends and disarms.
 
-Started as `python scripted_px4.py -i INSTANCE`. With `--stall` it stops answering in flight; with `--stop` it is halted
+Started as `python scripted_px4.py -i INSTANCE`. With `--silent FILE` it connects, writes its process id, and never
+answers; with `--stall` it stops answering in flight; with `--stop` it is halted
 there for 3 s. With `--starts FILE` it appends its instance and process id to a file. With `--cores FILE` it writes, in
 flight, the cores of its thread and of each thread of its parent process. With `--estimate BIAS` it sends the true state
 as its estimate, with a bias of the velocity north [m/s].
@@ -97,6 +98,7 @@ def main():
     """Run the flight."""
     parser = argparse.ArgumentParser()
     parser.add_argument("-i", type=int)
+    parser.add_argument("--silent", type=Path)
     parser.add_argument("--stall", action="store_true")
     parser.add_argument("--stop", action="store_true")
     parser.add_argument("--starts", type=Path)
@@ -107,6 +109,9 @@ def main():
         with options.starts.open("a") as file:
             file.write(f"{options.i} {os.getpid()}\n")
     peer, vehicle = Px4Peer(4560 + options.i), VehicleSide(options.i)
+    if options.silent:
+        options.silent.write_text(str(os.getpid()))
+        peer.receive("NEVER")
     message = peer.start()
     ground = height = rate = 0.0
     armed_at = None

@@ -2,7 +2,10 @@
 
 import json
 import os
+import signal
+import subprocess
 import sys
+import time
 from pathlib import Path
 
 import numpy as np
@@ -13,7 +16,8 @@ from lapwing.cosim.log import LogReader
 from lapwing.cosim.scene.scene_error import SceneError
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.services.scene_resolver import load, resolve
-from tests.services.firmware_links import fly, lapwing, scripted
+from tests.participants import running
+from tests.services.firmware_links import fly, lapwing, program, scripted
 
 SCENE = Path(__file__).parents[3] / "lapwing/scenes/px4_quad.toml"
 COUNTS = "skew 0 ms, resent 0, late 0, missed 0, rejected 0"
@@ -38,6 +42,27 @@ def test_stalled_firmware_is_reported_and_log_readable(tmp_path):
     with LogReader(log) as reader:
         times, _ = reader.history("/drone1/ground_truth")
     assert times[-1] > 2_000_000_000
+
+
+@pytest.mark.long
+@pytest.mark.parametrize(
+    ("mode", "number"), [("single-process", signal.SIGINT), ("single-process", signal.SIGTERM),
+                         ("multi-process", signal.SIGTERM)]
+)  # fmt: skip
+def test_signal_ends_run_whose_firmware_never_answers(tmp_path, mode, number):
+    options = "--mode", mode, "--log", tmp_path / "a.mcap", "--set", "autopilot.start_timeout=3000"
+    words = "run", "px4_quad", *options, *program(scripted("px4", "--silent", tmp_path / "pid"))
+    run = subprocess.Popen([sys.executable, "-m", "lapwing", *map(str, words)], stderr=subprocess.PIPE, text=True)
+    try:
+        while not (tmp_path / "pid").exists() or not (tmp_path / "pid").read_text():
+            assert run.poll() is None, run.stderr.read()
+            time.sleep(0.1)
+        run.send_signal(number)
+        error = run.communicate(timeout=300.0)[1]
+    finally:
+        run.kill()
+    assert (run.returncode, error) == (128 + number, f"lapwing: ended by {number.name}\n")
+    assert not running(int((tmp_path / "pid").read_text()))
 
 
 @pytest.mark.long

@@ -4,14 +4,12 @@ import numpy as np
 
 from lapwing.dynamics.environment import STANDARD
 from lapwing.dynamics.geodesy import geodetic_to_enu
-from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.noise import stream_key
-from lapwing.dynamics.vector import ZERO
 from lapwing.kernels import kernel
 from lapwing.services.sensors import airspeed, barometer, gps, imu, magnetometer, optical_flow, rangefinder, sonar
 from lapwing.services.sensors.sensor_inputs import Truth
 
-REST = Truth(ZERO, NO_ROTATION, ZERO, ZERO, ZERO, 2.0, 9.81, *STANDARD[:2], STANDARD.magnetic_field_world)
+REST = Truth(height_above_ground=2.0, environment=STANDARD._replace(gravity=9.81))
 
 
 @kernel
@@ -52,7 +50,8 @@ def record_gps(p, key, truth, out):
     s = gps.initial(p, key, truth)
     for k in range(len(out)):
         s, r = gps.sample(p, s, key, k, truth)
-        out[k, 0], out[k, 1], out[k, 2] = geodetic_to_enu(truth.home, r.latitude_deg, r.longitude_deg, r.height)
+        home = truth.environment.home
+        out[k, 0], out[k, 1], out[k, 2] = geodetic_to_enu(home, r.latitude_deg, r.longitude_deg, r.height)
         out[k, 3], out[k, 4], out[k, 5] = r.velocity_world
 
 

@@ -4,9 +4,7 @@ import numpy as np
 import pytest
 
 from lapwing.dynamics.environment import STANDARD
-from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.noise import stream_key
-from lapwing.dynamics.vector import ZERO
 from lapwing.services.sensors import imu, magnetometer, schema
 from lapwing.services.sensors.fault_schedule import compile_faults
 from lapwing.services.sensors.sensor_inputs import Truth
@@ -24,7 +22,8 @@ def fly(fault, sensor="magnetometer", ticks=30):
 
     def truth(tick):
         field = (float(tick), 0.0, 0.0)
-        return Truth(ZERO, NO_ROTATION, ZERO, field, ZERO, 1.0, 9.81, *STANDARD[:2], field)
+        environment = STANDARD._replace(gravity=9.81, magnetic_field_world=field)
+        return Truth(omega_body=field, height_above_ground=1.0, environment=environment)
 
     s = module.initial(p, key, truth(0))
     readings = []

@@ -7,14 +7,13 @@ import pytest
 from scipy import signal
 
 from lapwing.dynamics.environment import STANDARD
-from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.noise import stream_key
 from lapwing.dynamics.vector import ZERO
 from lapwing.kernels import kernel
 from lapwing.services.sensors import imu, low_pass
 from lapwing.services.sensors.low_pass import LowPass
 from lapwing.services.sensors.rotor_vibration import Damage, RotorVibration
-from lapwing.services.sensors.sensor_inputs import Truth
+from lapwing.services.sensors.sensor_inputs import Rotors, Truth
 from lapwing.services.sensors.triad import CrossCoupling
 from tests.commands import assert_rejected, run_command
 
@@ -22,8 +21,8 @@ pytestmark = pytest.mark.usefixtures("uncompiled")
 
 KEY = stream_key(3, "drone1", "imu")
 G0 = 9.80665
-REST = Truth(ZERO, NO_ROTATION, ZERO, ZERO, ZERO, 2.0, G0, *STANDARD[:2], STANDARD.magnetic_field_world)
-TURNING = REST._replace(rotor_speeds=(500.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0), rotor_speed=500.0)
+REST = Truth(height_above_ground=2.0, environment=STANDARD._replace(gravity=G0))
+TURNING = REST._replace(rotors=Rotors(500.0, (500.0, *(0.0,) * 7)))
 
 
 @kernel
@@ -34,9 +33,8 @@ def record(p, key, truth, push, spin, out):
         push_world, spin_body = (push[k], 0.0, 0.0), (0.0, 0.0, spin[k])
         now = Truth(
             truth.position_world, truth.attitude, truth.velocity_world, spin_body, push_world,
-            truth.height_above_ground, truth.gravity, truth.home, truth.atmosphere, truth.magnetic_field_world,
-            truth.terrain, truth.angular_acceleration_body, 0.0, truth.air_velocity_world, truth.air_density, 0.0,
-            truth.rotor_speed, truth.rotor_speeds,
+            truth.angular_acceleration_body, truth.height_above_ground, truth.air_velocity_world, truth.air_density,
+            truth.rotors, truth.environment,
         )  # fmt: skip
         s, r = imu.sample(p, s, key, k, now)
         out[k, 0], out[k, 1], out[k, 2] = r.omega_body

@@ -24,7 +24,7 @@ from lapwing.dynamics.terrain import LEVEL, relief
 from lapwing.dynamics.vector import ZERO
 from lapwing.services.sensors import airspeed, barometer, gps, imu, magnetometer, optical_flow, rangefinder, sonar
 from lapwing.services.sensors.schema import parameters
-from lapwing.services.sensors.sensor_inputs import Truth
+from lapwing.services.sensors.sensor_inputs import Rotors, Truth
 
 pytestmark = pytest.mark.usefixtures("uncompiled")
 
@@ -34,7 +34,8 @@ FIELD = STANDARD.magnetic_field_world
 
 
 def truth(position=ZERO, attitude=NO_ROTATION, velocity=ZERO, omega=ZERO, acceleration=ZERO, height=2.0, terrain=LEVEL):
-    return Truth(position, attitude, velocity, omega, acceleration, height, G, *STANDARD[:2], FIELD, terrain)
+    environment = STANDARD._replace(gravity=G, terrain=terrain)
+    return Truth(position, attitude, velocity, omega, acceleration, height_above_ground=height, environment=environment)
 
 
 def read(module, p, *truths):
@@ -171,7 +172,7 @@ def test_sonar_range_by_height_and_tilt(height, tilt_deg, expected):
 def test_soft_ground_and_propellers_reduce_range_of_sonar(echo, rotor_speed, farthest):
     p = SONAR._replace(resolution=0.0, echo=echo)
     near, far = (
-        read(sonar, p, truth(height=scale * farthest)._replace(rotor_speed=rotor_speed)).range
+        read(sonar, p, truth(height=scale * farthest)._replace(rotors=Rotors(rotor_speed))).range
         for scale in (1.0 - 1e-6, 1.0 + 1e-6)
     )
     assert near == pytest.approx(farthest, rel=2e-6)
@@ -241,7 +242,7 @@ def test_gps_has_no_fix_under_roof():
 
 def test_motor_current_adds_magnetic_field():
     """10 A at 30 nT/A along y."""
-    near = truth()._replace(motor_current=10.0)
+    near = truth()._replace(rotors=Rotors(current=10.0))
     leads = magnetometer.Magnetometer(current_nt_per_a=(0.0, 30.0, 0.0))
     change = np.subtract(read(magnetometer, leads, near).field_body, FIELD)
     np.testing.assert_allclose(change, (0.0, 300e-9, 0.0), atol=1e-15)
@@ -429,7 +430,7 @@ def test_rotor_vibration_is_aliased_and_integration_attenuates():
     """251 Hz sampled at 250 Hz appears as 1 Hz; the mean over a sample attenuates it by sin(x)/x, x = pi 251/250."""
     speed = 2.0 * math.pi * 251.0
     shaking = imu.Vibration((100.0, 100.0, 50.0), 0.5 * speed)
-    now, result = truth()._replace(rotor_speed=speed), {}
+    now, result = truth()._replace(rotors=Rotors(speed)), {}
     for delta_output in (False, True):
         p = imu.Imu(rate=250.0, vibration=shaking, delta_output=delta_output)
         s, forces = imu.initial(p, KEY, now), []
@@ -447,7 +448,7 @@ def test_rotor_vibration_is_aliased_and_integration_attenuates():
 
 
 def test_rotor_thrust_changes_barometer_pressure():
-    flying = truth()._replace(thrust=98.0)
+    flying = truth()._replace(rotors=Rotors(thrust=98.0))
     still = read(barometer, barometer.Barometer(), flying).pressure
     assert read(barometer, barometer.Barometer(wash_pa_per_n=-0.2), flying).pressure - still == pytest.approx(-19.6)
 

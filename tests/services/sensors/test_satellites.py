@@ -9,7 +9,6 @@ from scipy.optimize import brentq
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.environment import STANDARD
 from lapwing.dynamics.geodesy import geodetic_to_enu
-from lapwing.dynamics.lie.quaternion import NO_ROTATION
 from lapwing.dynamics.noise import stream_key
 from lapwing.dynamics.terrain import LEVEL, relief
 from lapwing.dynamics.vector import ZERO
@@ -29,8 +28,7 @@ GALILEO = Constellation()
 
 
 def truth(position=ZERO, terrain=LEVEL):
-    field = STANDARD.magnetic_field_world
-    return Truth(position, NO_ROTATION, ZERO, ZERO, ZERO, 2.0, 9.81, *STANDARD[:2], field, terrain)
+    return Truth(position, height_above_ground=2.0, environment=STANDARD._replace(gravity=9.81, terrain=terrain))
 
 
 def readings(p, samples, at=None, terrain=LEVEL, key=KEY):

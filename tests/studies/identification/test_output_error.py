@@ -19,6 +19,7 @@ from lapwing.studies.identification.procedure import (
 )
 from lapwing.studies.validation.plant_rows import PlantRows
 from lapwing.studies.validation.start_states import NO_TRIM
+from tests.combinations import rest_nightly
 from tests.commands import assert_rejected, run_command
 
 SCENE = "crazyflie_21"
@@ -153,7 +154,7 @@ def test_command_writes_airframe_with_provenance(plant, tmp_path):
 @pytest.mark.long
 @pytest.mark.parametrize(
     ("free", "message"),
-    [
+    rest_nightly(
         ("airframe.motor.colour", "no number of this name"),
         ("airframe.mass.totl", "did you mean airframe.mass.total?"),
         ("effects.h_force.coeficient", "did you mean effects.h_force.coefficient?"),
@@ -161,7 +162,8 @@ def test_command_writes_airframe_with_provenance(plant, tmp_path):
         ("zzz", "use a key that the scene"),
         ("a,a", "contains a key twice"),
         ("", "--free: missing"),
-    ],
+        keep=2,
+    ),
 )
 def test_command_rejects_unknown_parameters(plant, tmp_path, free, message):
     path = write_csv(tmp_path / "flight.csv", simulated(plant, 2.0, [1])[0])

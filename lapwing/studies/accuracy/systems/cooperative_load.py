@@ -27,8 +27,8 @@ PUSHED = LiftCommand((9.0, 10.0), ((0.02, -0.01, 0.03), (-0.02, 0.015, 0.01)))
 OFF = LiftCommand((0.0, 0.0), ((0.0, 0.0, 0.0), (0.0, 0.0, 0.0)))
 
 
-def _parameters(drive: LiftCommand) -> CooperativeLoadParameters:
-    return CooperativeLoadParameters((0.755, 0.755), (INERTIA, INERTIA), (0.6, 0.8), 0.4, 9.81, drive)
+def _parameters(control: LiftCommand) -> CooperativeLoadParameters:
+    return CooperativeLoadParameters((0.755, 0.755), (INERTIA, INERTIA), (0.6, 0.8), 0.4, 9.81, control)
 
 
 def problems() -> dict[str, Problem]:
@@ -76,7 +76,7 @@ def right_hand_side(p: CooperativeLoadParameters, z: np.ndarray) -> np.ndarray:
     mass = np.repeat([p.load_mass, *p.quad_mass], 3)
     force = np.zeros((n + 1, 3))
     force[:, 2] = -mass[::3] * p.gravity
-    force[1:] += R.reshape(n, 3, 3)[:, :, 2] * np.array(p.drive.thrust)[:, None]
+    force[1:] += R.reshape(n, 3, 3)[:, :, 2] * np.array(p.control.thrust)[:, None]
     jacobian, right = np.zeros((n, k)), np.zeros(n)
     for i in range(n):
         d, dv = r[i + 1] - r[0], v[i + 1] - v[0]
@@ -85,7 +85,7 @@ def right_hand_side(p: CooperativeLoadParameters, z: np.ndarray) -> np.ndarray:
     saddle = np.block([[np.diag(mass), jacobian.T], [jacobian, np.zeros((n, n))]])
     acceleration = np.linalg.solve(saddle, np.concatenate([force.ravel(), right]))[:k]
     inertia = np.array(p.quad_inertia)
-    spin = (np.array(p.drive.moment_body) - np.cross(o, inertia * o)) / inertia
+    spin = (np.array(p.control.moment_body) - np.cross(o, inertia * o)) / inertia
     return np.concatenate([v.ravel(), acceleration, *map(attitude_rate, R, o), spin.ravel()])
 
 

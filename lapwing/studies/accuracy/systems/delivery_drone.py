@@ -22,7 +22,7 @@ from lapwing.dynamics.multibody.five_bodies import machine as five_bodies_machin
 from lapwing.dynamics.vehicles import multirotor, multirotor_euler, multirotor_multibody
 from lapwing.dynamics.vehicles.airframe import load_airframe
 from lapwing.dynamics.vehicles.multirotor import advance
-from lapwing.dynamics.vehicles.multirotor_equations import MultirotorDrive, MultirotorState, motion_of
+from lapwing.dynamics.vehicles.multirotor_equations import MultirotorState, StepInputs, motion_of
 from lapwing.dynamics.vehicles.multirotor_euler import FiveEulerBodies
 from lapwing.dynamics.vehicles.multirotor_multibody_equations import without_loads
 from lapwing.kernels import kernel
@@ -48,8 +48,8 @@ def _violation_of_one(p: Any, x: Any) -> float:
 
 @kernel
 def _violation_of_five(p: Any, x: Any) -> float:
-    drive = MultirotorDrive(p, p.body, (), p.layout.x_body)
-    return five_body_stabilisation.constraint_violation(without_loads(drive, motion_of(p.layout, x)), x)[0]
+    u = StepInputs(p, p.body, (), p.layout.x_body)
+    return five_body_stabilisation.constraint_violation(without_loads(u, motion_of(p.layout, x)), x)[0]
 
 
 @kernel
@@ -90,11 +90,11 @@ def problems() -> dict[str, Problem]:
         _solver_method("reduced, frame only", plain, start, volts),
         _solver_method("reduced, mean", mean, start, volts),
     ]
-    for name, form in (("SE(3)", multirotor_multibody), ("Euler", multirotor_euler)):
+    for name, formulation in (("SE(3)", multirotor_multibody), ("Euler", multirotor_euler)):
         for stabilisation in multirotor_multibody.STABILISATIONS:
-            p = form.parameters(frame, (), "speed", stabilisation)
+            p = formulation.parameters(frame, (), "speed", stabilisation)
             x = initial_bodies(p, frame)
-            state = MultirotorState(x if form is multirotor_multibody else multirotor_euler.of_five(x), ())
+            state = MultirotorState(x if formulation is multirotor_multibody else multirotor_euler.of_five(x), ())
             methods.append(_solver_method(f"{name}, {stabilisation}", p, state, volts))
     problem = Problem(
         "delivery drone of one and of five bodies, tumbling",

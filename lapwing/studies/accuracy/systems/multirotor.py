@@ -10,7 +10,7 @@ from lapwing.dynamics.integrators import RATES
 from lapwing.dynamics.lie.quaternion import exp
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.dynamics.vehicles.airframe import load_airframe
-from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, MultirotorDrive, rate
+from lapwing.dynamics.vehicles.multirotor_equations import STANDARD_DENSITY, StepInputs, rate
 from lapwing.studies.accuracy.coordinates import of_state
 from lapwing.studies.accuracy.integrate import solver_methods
 from lapwing.studies.accuracy.problem import Problem
@@ -23,33 +23,33 @@ START = Motion(
     (0.0, 0.0, 50.0), exp((0.2, -0.4, 0.1)), (1.0, 0.5, -0.3), (2.0, -1.5, 1.0), (330.0, 340.0, 320.0, 335.0)
 )
 
-RATES[MultirotorDrive] = rate
+RATES[StepInputs] = rate
 
 
 def problems() -> dict[str, Problem]:
     """Return the problem of this file: the tumbling delivery drone without other effects."""
-    drive = bare_drive()
+    u = bare_inputs()
     problem = Problem(
         "delivery drone, bare and tumbling",
         DURATION,
-        solver_methods(drive, START, DURATION, 16),
-        lambda: dop853(lambda t, y: right_hand_side(drive, y), of_state(START), DURATION),
+        solver_methods(u, START, DURATION, 16),
+        lambda: dop853(lambda t, y: right_hand_side(u, y), of_state(START), DURATION),
         DOP853,
     )
     return {"multirotor": problem}
 
 
-def bare_drive() -> MultirotorDrive:
+def bare_inputs() -> StepInputs:
     """Return the drone under gravity and thrust, with its voltages."""
     frame = load_airframe(AIRFRAME)
     p = multirotor.parameters(frame, effects.from_scene({"gravity": {}, "rotor_thrust": {}}, frame))
-    return MultirotorDrive(p, p.body, multirotor.initial_state(p).memory, VOLTAGE)
+    return StepInputs(p, p.body, multirotor.initial_state(p).memory, VOLTAGE)
 
 
-def right_hand_side(drive: MultirotorDrive, y: np.ndarray) -> np.ndarray:
+def right_hand_side(u: StepInputs, y: np.ndarray) -> np.ndarray:
     """Return Newton, Euler and a first-order lag for (position, row-major R, velocity, omega, rotor speeds)."""
-    layout, body = drive.parameters.layout, drive.parameters.body
-    gravity, rotor = drive.parameters.effects
+    layout, body = u.parameters.layout, u.parameters.body
+    gravity, rotor = u.parameters.effects
     R, o, speed = y[3:12].reshape(3, 3), y[15:18], y[18:22]
     thrust = rotor.thrust_constant * STANDARD_DENSITY * speed**2
     drag = rotor.torque_constant * STANDARD_DENSITY * speed**2
@@ -59,5 +59,5 @@ def right_hand_side(drive: MultirotorDrive, y: np.ndarray) -> np.ndarray:
     inertia = np.array(body.inertia)
     omega_rate = (torque - np.cross(o, inertia * o)) / inertia
     acceleration = R[:, 2] * thrust.sum() / body.mass - [0.0, 0.0, gravity.acceleration]
-    lag = layout.lag_rate * (np.array(drive.voltage) * layout.speed_per_volt - speed)
+    lag = layout.lag_rate * (np.array(u.voltage) * layout.speed_per_volt - speed)
     return np.concatenate([y[12:15], attitude_rate(y[3:12], o), acceleration, omega_rate, lag])

@@ -49,7 +49,7 @@ def initial_state(name: str) -> tuple[Any, CooperativeLoadState]:
 
 
 def formation(
-    load: float, lengths: Pair, angles: Pair, rates: Pair, drive: LiftCommand
+    load: float, lengths: Pair, angles: Pair, rates: Pair, control: LiftCommand
 ) -> tuple[Any, CooperativeLoadState]:
     """Return (parameters, state) of two level quadrotors with a load.
 
@@ -58,9 +58,9 @@ def formation(
         lengths: lengths of the links [m].
         angles: angles of the links from straight down [rad].
         rates: their rates [rad/s].
-        drive: thrusts and moments.
+        control: thrusts and moments.
     """
-    p = CooperativeLoadParameters((QUAD, QUAD), (INERTIA, INERTIA), lengths, load, G, drive)
+    p = CooperativeLoadParameters((QUAD, QUAD), (INERTIA, INERTIA), lengths, load, G, control)
     swings = tuple(
         Swing((math.sin(a), 0.0, -math.cos(a)), (0.0, -rate, 0.0)) for a, rate in zip(angles, rates, strict=True)
     )

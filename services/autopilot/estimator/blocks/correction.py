@@ -1,12 +1,10 @@
 """Fusion of barometer, magnetometer, distance and optical flow readings."""
 
-from typing import Any, NamedTuple
-
-from numba import types
+from typing import NamedTuple
 
 from lapwing.cosim.diagram.compiled_block import CONTINUE, InputSample
 from lapwing.kernels import DispatchTable, always_inline
-from lapwing.kernels.codegen import generic
+from lapwing.kernels.codegen import dispatch
 from lapwing.services.autopilot import estimator
 from lapwing.services.autopilot.estimator import Estimator, State
 from lapwing.services.autopilot.estimator.blocks.navigation_state import NavigationState
@@ -45,12 +43,7 @@ UPDATES[BarometerReading] = _barometer
 UPDATES[MagnetometerReading] = _magnetometer
 UPDATES[DistanceReading] = _distance
 UPDATES[OpticalFlowReading] = _flow
-
-
-@generic(inline=True)
-def update(p: types.Type, x: types.Type, r: types.Type) -> Any:
-    """Return the filter's state after a reading."""
-    return UPDATES[r.instance_class]
+update = dispatch(UPDATES, 2)
 
 
 @always_inline

@@ -6,6 +6,7 @@ import shutil
 import socket
 import subprocess
 import sys
+import time
 from contextlib import ExitStack
 from pathlib import Path
 
@@ -67,8 +68,9 @@ class Simulator:
             self.socket.listen()
         self.process = subprocess.Popen(
             [program, kind, *map(str, (*arguments, *extra))], env=environment, start_new_session=True,
-            pass_fds=(self.library.child.fileno(),) if ordered else (),
+            pass_fds=(self.library.child.fileno(),) if ordered else (), stdout=subprocess.PIPE,
         )  # fmt: skip
+        stack.callback(self.process.stdout.close)
         stack.callback(self.process.wait)
         stack.callback(self.process.kill)
         self.peer = (HOST, state)
@@ -88,7 +90,7 @@ class Simulator:
         return getattr(self.library, event)
 
     def step(self, number):
-        """Return the answer to a message."""
+        """Return the answer to a message; without the library, it may be missing."""
         data = number.to_bytes(8, "little")
         self.socket.sendto(data, self.peer) if self.kind != "connect" else self.socket.sendall(data)
         result = b""
@@ -96,6 +98,8 @@ class Simulator:
             while not result or (self.kind == "connect" and self.library and not result.endswith(IDLE)):
                 result += self.socket.recv(64)
         except TimeoutError:
+            if self.library:
+                raise
             return b"none"
         return result
 
@@ -136,6 +140,18 @@ def test_seed_varies_order_of_threads(program, tmp_path):
     assert len(set(digests)) == 3
 
 
+def test_clock_follows_real_time_once_the_link_is_closed(program, tmp_path):
+    with ExitStack() as stack:
+        simulator = Simulator(stack, program, "send", tmp_path, extra=("alone",))
+        simulator.step(0)
+        simulator.library.close()
+        start = time.monotonic()
+        os.read(simulator.process.stdout.fileno(), 1)
+        for _ in range(5):  # its wait for a message ends after 0.1 s
+            os.read(simulator.process.stdout.fileno(), 1)
+        assert time.monotonic() - start > 0.5
+
+
 @pytest.mark.long
 def test_spinning_thread_is_named(program, tmp_path):
     with ExitStack() as stack:
@@ -143,7 +159,8 @@ def test_spinning_thread_is_named(program, tmp_path):
         for number in range(49):
             simulator.step(number)
         simulator.socket.settimeout(1.0)
-        simulator.step(49)
+        with pytest.raises(TimeoutError):
+            simulator.step(49)
         assert "spins: 5 s of CPU time" in simulator.wait("stuck")
 
 

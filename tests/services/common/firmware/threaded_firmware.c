@@ -1,11 +1,14 @@
 /* Program that behaves as a firmware: its answers depend on the order of its threads, on its clock, and on a start script.
  *
- * usage: threaded_firmware bind STATE_PORT MOTOR_PORT | send PORT | connect PORT SOCKET_PATH | client SOCKET_PATH
+ * usage: threaded_firmware bind STATE_PORT MOTOR_PORT | send PORT | connect PORT SOCKET_PATH | client SOCKET_PATH PID TEXT...
  *        with a further argument "spin", "barrier" or "foreign PORT": it breaks the rule of this name.
+ *        "alone": without its other threads. A point on the standard output: no message for 0.1 s.
+ *        A client sends commands; if PID is not 0, they come together, because this process is stopped meanwhile.
  */
 #include <arpa/inet.h>
 #include <poll.h>
 #include <pthread.h>
+#include <signal.h>
 #include <stdint.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -19,7 +22,7 @@
 static uint64_t state = 1, message, taken;
 static pthread_mutex_t lock = PTHREAD_MUTEX_INITIALIZER;
 static pthread_cond_t arrived = PTHREAD_COND_INITIALIZER;
-static int breaks;
+static int breaks, alone;
 
 static void mix(uint64_t number) {
     struct timespec now;
@@ -121,32 +124,39 @@ static void *server(void *fd) {
         pthread_mutex_unlock(&commands);
     }
 }
-static int command(const char *path, const char *text) {
-    int fd = socket(AF_UNIX, SOCK_STREAM, 0);
+static int commands_of(const char *path, int pid, char **texts, int count) {
     struct sockaddr_un at = {.sun_family = AF_UNIX};
+    int fds[8], result = 0;
     char data[8];
     strncpy(at.sun_path, path, sizeof at.sun_path - 1);
-    if (connect(fd, (void *)&at, sizeof at)) return 4;
-    send(fd, text, strlen(text), 0);
-    return recv(fd, data, sizeof data, 0) == 2 ? 0 : 5;
+    if (pid) kill(pid, SIGSTOP);
+    for (int k = 0; k < count; k++) {
+        fds[k] = socket(AF_UNIX, SOCK_STREAM, 0);
+        if (connect(fds[k], (void *)&at, sizeof at)) result = 4;
+        send(fds[k], texts[k], strlen(texts[k]), MSG_NOSIGNAL);
+    }
+    if (pid) kill(pid, SIGCONT);
+    for (int k = 0; k < count; k++) if (recv(fds[k], data, sizeof data, 0) != 2) result = 5;
+    return result;
 }
 static void run_script(const char *program, const char *path, int together) {
     struct sockaddr_un own = {.sun_family = AF_UNIX};
+    const char *format = "for k in first start last; do '%s' client '%s' 0 $k || exit 7; done";
     char text[1024];
     int fd = socket(AF_UNIX, SOCK_STREAM, 0);
     strncpy(own.sun_path, path, sizeof own.sun_path - 1);
     if (bind(fd, (void *)&own, sizeof own) || listen(fd, 5)) exit(6);
     start(server, fd);
-    snprintf(text, sizeof text, "for k in first start last; do '%s' client '%s' $k %s done; wait", program, path,
-             together ? "&" : "|| exit 7;");
+    snprintf(text, sizeof text, together ? "'%s' client '%s' %d first start last" : format, program, path, getpid());
     if (system(text)) exit(7);
 }
 int main(int count, char **arguments) {
     const char *kind = arguments[1];
-    if (!strcmp(kind, "client")) return command(arguments[2], arguments[3]);
+    if (!strcmp(kind, "client")) return commands_of(arguments[2], atoi(arguments[3]), arguments + 4, count - 4);
     for (int k = 2; k < count; k++) {
         if (!strcmp(arguments[k], "spin")) breaks = 1;
         if (!strcmp(arguments[k], "barrier")) breaks = 2;
+        if (!strcmp(arguments[k], "alone")) alone = 1;
         if (!strcmp(arguments[k], "foreign")) start(foreign, atoi(arguments[k + 1]));
     }
     struct sockaddr_in at = {.sin_family = AF_INET, .sin_port = htons(atoi(arguments[2])), .sin_addr.s_addr = htonl(INADDR_LOOPBACK)};
@@ -155,7 +165,7 @@ int main(int count, char **arguments) {
     if (stream) {
         while (connect(fd, (void *)&at, sizeof at)) usleep(1000);
         run_script(arguments[0], arguments[3], count > 4);
-    } else start_all();
+    } else if (!alone) start_all();
     if (!strcmp(kind, "bind")) {
         if (bind(fd, (void *)&at, sizeof at)) return 8;
         at.sin_port = htons(atoi(arguments[3]));
@@ -169,7 +179,7 @@ int main(int count, char **arguments) {
         struct timeval wait = {0, 100000};
         FD_ZERO(&set);
         FD_SET(fd, &set);
-        if (select(fd + 1, &set, NULL, NULL, &wait) <= 0) continue;
+        if (select(fd + 1, &set, NULL, NULL, &wait) <= 0) { write(1, ".", 1); continue; }
         if (recv(fd, &value, 8, 0) != 8) return 0;
         uint64_t result = answer(value);
         if (value % 10 != 9) sendto(out, &result, 8, MSG_NOSIGNAL, to, to ? sizeof at : 0); /* not in each step */
