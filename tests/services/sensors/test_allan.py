@@ -140,7 +140,7 @@ def test_every_noise_has_mean_zero():
 def test_biases_have_mean_zero_and_stated_spread_over_vehicles():
     p = imu.Imu(gyro=imu.Gyro(turn_on_bias_dps=0.1), accelerometer=imu.Accelerometer(turn_on_bias_mg=3.0))
     first = np.array([record("imu", p, 1, seed=seed)[0] for seed in range(600)])
-    first[:, 5] -= REST.gravity
+    first[:, 5] -= REST.environment.gravity
     spread = np.array([0.1 * DPS] * 3 + [3.0 * MG] * 3)
     assert np.all(np.abs(first.mean(axis=0)) < 4 * spread / math.sqrt(600))
     np.testing.assert_allclose(first.std(axis=0), spread, rtol=4 / math.sqrt(2 * 600))
