@@ -1,23 +1,27 @@
-"""Picture of the studio's form: python docs/pictures/studio.py [FILE.png] (needs chromium)."""
+"""Picture of the studio's form and 3D view: python docs/pictures/studio.py [FILE.png] (needs chromium)."""
 
 import os
 import subprocess
 import sys
 import tempfile
 from pathlib import Path
+from urllib.parse import urlencode
 
+from lapwing.cli.new_command import write_scene
 from lapwing.views.view3d.headless import Browser
 
 HERE = Path(__file__).parent
-CHANGED = "set=run.seed=7&set=effects.random_wind_force.mean=[6.0, 2.0, 0.0]#effects"
+PLACED = (
+    "trajectory.waypoints=[[0, 0, 3], [6, 0, 3], [7, 5, 4], [1, 6, 4]]",
+    'environment.terrain.box=[{position = [8, -1], size = [2, 1.5], top = 2.5, name = "depot"}]',
+    "fence.keep_in=[{corners = [[-3, -3], [10, -3], [10, 9], [-3, 9]]}]",
+    "fence.keep_out=[{position = [2.5, 3.2], radius = 1.8}]",
+)
+WIND = "effects.wind_constant.velocity=[2, 1, 0]"
 WAIT = """
 while (document.readyState !== "complete" || !document.querySelector("#scene")?.dataset.previewed) {
   await new Promise((done) => setTimeout(done, 50));
 }
-document.querySelector("#filter").value = "wind";
-document.querySelector("#filter").dispatchEvent(new Event("input"));
-await new Promise((done) => setTimeout(done, 500));
-scrollTo(0, 0);
 """
 
 
@@ -30,9 +34,11 @@ def main(target: Path | str) -> None:
         subprocess.Popen(command, cwd=folder, env=environment, stdout=subprocess.PIPE, text=True) as studio,
     ):
         try:
+            write_scene("my_flight", Path(folder))
             assert studio.stdout is not None
             address = studio.stdout.readline().removeprefix("studio: ").strip()
-            with Browser(f"{address}scenes/delivery_mission?{CHANGED}", size=(1280, 760)) as browser:
+            query = urlencode([("add", "effects.wind_constant"), *(("set", text) for text in PLACED), ("set", WIND)])
+            with Browser(f"{address}scenes/my_flight.toml?{query}", size=(1280, 900)) as browser:
                 browser.run(WAIT)
                 Path(target).write_bytes(browser.picture())
         finally:

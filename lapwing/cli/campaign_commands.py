@@ -257,6 +257,7 @@ def _fly(
     from lapwing.cli.progress import StudyProgress
     from lapwing.studies.campaign.shard_loop import Count
     from lapwing.studies.campaign.shard_loop import campaign as study
+    from lapwing.studies.campaign.statistics import percent
 
     start, previous = time.monotonic(), -1
     runs = {k: len(shard) for k, shard in enumerate(folder.shards) if part is None or k in part}  # by own shard
@@ -270,8 +271,7 @@ def _fly(
             nonlocal previous
             previous = count.runs if previous < 0 else previous
             finished, rate = count.runs - previous, (count.runs - previous) / max(time.monotonic() - start, 1e-9)
-            p = count.failure
-            text = f"{rate:.1f} runs/s, {count.failures} failures, {p.low:.1%} to {p.high:.1%}"
+            text = f"{rate:.1f} runs/s, {count.failures} failures, {percent(count.failure)}"
             progress.say(text, before + finished, own_runs)
 
         study(folder, first, workers, say, until, part)

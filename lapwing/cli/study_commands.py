@@ -2,7 +2,6 @@
 
 import sys
 from collections.abc import Callable
-from functools import partial
 from itertools import count
 from pathlib import Path
 from types import ModuleType
@@ -139,10 +138,15 @@ def accuracy(
     The first line is the cheapest one that meets the target, by evaluations. The subject is a reference problem with a
     known solution, or the plant of a scene.
     """
+    from lapwing.cli.progress import step_progress
     from lapwing.views.studies import accuracy_command
 
     console = accuracy_command.console()
-    find = partial(accuracy_command.study, console, target, set_ or [], goal)
+
+    def find() -> accuracy_command.Study:
+        with step_progress(console, "parts", 1) as progress:
+            return accuracy_command.study(target, set_ or [], goal, progress)
+
     _study("TARGET", Path(target), json, plot, console, find, accuracy_command)
 
 

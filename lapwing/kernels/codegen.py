@@ -5,6 +5,7 @@ calls is generated at compile time and has no cost at run time. All generated so
 """
 
 import inspect
+import sys
 from collections.abc import Callable, Mapping
 from functools import wraps
 from typing import Any
@@ -65,12 +66,12 @@ def dispatch(table: DispatchTable, argument: int = 0, field: str = "") -> Callab
         field: field of the implementation to call, if it has several functions.
     """
 
-    @generic(inline=True)
     def call(*arguments: Any) -> Any:
         found = table[arguments[argument].instance_class]
         return getattr(found, field) if field else found
 
-    return call
+    call.__module__ = sys._getframe(1).f_globals["__name__"]  # whose source is part of the key of callers
+    return generic(inline=True)(call)
 
 
 def overload_for(function: Callable, *, inline: bool = False) -> Callable[[Callable[..., Callable]], Callable]:

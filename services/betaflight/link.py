@@ -77,8 +77,8 @@ class BetaflightLink(ProgramLink):
         ports, turns = self._ports, None
         if self._config.command:
             self._start()
-            self._complete(self._configure)
             assert self._program is not None
+            self._complete(partial(boot.configure, self._config, self._program, self._waits))
             turns = Turns(
                 "b", ports.state, self._config.interval_ns, (ports.msp, ports.motors), IDLE, ports.motors,
                 start_ns=BOOT, read_ns=READING,
@@ -88,7 +88,7 @@ class BetaflightLink(ProgramLink):
 
     def _complete(self, start: Callable[[], None], turns: Turns | None = None) -> None:
         """Call `start`; call it again with a new program if part of this one has not started."""
-        for left in reversed(range(STARTS if self._program else 1)):
+        for left in reversed(range(STARTS)):
             try:
                 start()
                 return
@@ -99,12 +99,8 @@ class BetaflightLink(ProgramLink):
                 if self._msp:
                     self._msp.close()
                 self._program.stop()
-                self._program.restart(self._prepare(turns) if turns else None)
+                self._program.restart(turns and self._prepare(turns))
                 self._sender = None
-
-    def _configure(self) -> None:
-        assert self._program is not None
-        boot.configure(self._config, self._program, self._waits)
 
     def _calibrate(self) -> None:
         """Connect to the firmware, and let it calibrate its sensors."""

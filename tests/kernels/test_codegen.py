@@ -92,5 +92,6 @@ def test_class_without_function_has_no_entry():
     missing = DispatchTable("push")
     assert missing.get(Spring) is None
     assert Spring not in PULLS
+    assert pull_of.__module__ == __name__
     with pytest.raises(KeyError, match="test_codegen has no push"):
         missing[Spring]

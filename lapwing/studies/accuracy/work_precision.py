@@ -41,17 +41,25 @@ class Point(NamedTuple):
         return math.inf if self.evaluations is None else self.evaluations, -self.setting, self.error
 
 
-def measure(problem: Problem, most: int = MOST_EVALUATIONS, timed: bool = True) -> list[Point]:
+def measure(
+    problem: Problem,
+    most: int = MOST_EVALUATIONS,
+    timed: bool = True,
+    progress: Callable[[str, int], None] = lambda name, done: None,
+) -> list[Point]:
     """Return all points of a problem, method by method, each from coarse to fine.
 
     Args:
         problem: any problem.
         most: evaluations of a run after which its method is not refined.
         timed: measure the CPU time of each run.
+        progress: called with the name of the next part and the number of finished methods.
     """
+    progress("reference", 0)
     exact = problem.reference()
     points = []
-    for method in problem.methods:
+    for done, method in enumerate(problem.methods):
+        progress(method.name, done)
         method.idle()  # compiles or loads the kernels
         points += _refine(problem, method, exact, most, timed)
     return points

@@ -1,7 +1,7 @@
 """`lapwing accuracy`: study of a target, with printed, written and plotted results."""
 
 import sys
-import threading
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -31,7 +31,6 @@ from lapwing.views.studies import accuracy_plot
 from lapwing.views.terminal import table
 
 WIDTH = 120  # characters of a table without a terminal
-SLOW = 3.0  # [s] after which the reason is printed
 GOAL = 1e-6  # error of the first line without another one
 STRICTER = 0.1  # ratio of the smaller error whose cost the first line has
 
@@ -54,14 +53,19 @@ def console() -> Console:
     return terminal.console(None if sys.stdout.isatty() else WIDTH)
 
 
-def study(screen: Console, target: str, overrides: list[str], goal: float | None) -> Study:
+def study(
+    target: str,
+    overrides: list[str],
+    goal: float | None,
+    progress: Callable[[str, int, int], None] = lambda text, done, total: None,
+) -> Study:
     """Study one target.
 
     Args:
-        screen: console for progress messages.
         target: name of a problem, or path of a scene.
         overrides: "key=value" of the scene.
         goal: error for which the cheapest solver is selected; None: that of the scene, or `GOAL`.
+        progress: called with the current part, and the numbers of finished and of all parts.
 
     Raises:
         ValueError: the target or goal is invalid, or no method meets a given goal.
@@ -69,24 +73,21 @@ def study(screen: Console, target: str, overrides: list[str], goal: float | None
     check_target(goal)
     scene = scene_of(target, overrides)
     problem = scenes.problem(scene.each_vehicle[0]) if scene else find(target)
-    compiled = statistics().compiled
+    compiled, methods = statistics().compiled, len(problem.methods)
 
-    def notify() -> None:
-        screen.print("compiling, and measuring ..." if statistics().compiled > compiled else "measuring ...")
+    def say(name: str, done: int) -> None:
+        once = "compiling (once) and " if statistics().compiled > compiled else ""
+        progress(f"{once}measuring {name}", done, methods + 2)
 
-    notice = threading.Timer(SLOW, notify)
-    notice.daemon = True
-    notice.start()
-    try:
-        points = measure(problem)
-        asked = goal or (scene and scene.each_vehicle[0][Solver].accuracy) or GOAL
-        reached = goal is not None or any(p.error <= asked for p in points)
-        selected = cheapest(points, asked) if reached else None
-        parts = error_budget.errors(scene) if scene else []
-        cost = costs(scene, [tables_of(scene)])[0][:2] if scene and error_budget.has_contact(scene) else None
-        return Study(target, problem, points, asked, selected, parts, round_off.measure(problem), cost)
-    finally:
-        notice.cancel()
+    points = measure(problem, progress=say)
+    asked = goal or (scene and scene.each_vehicle[0][Solver].accuracy) or GOAL
+    reached = goal is not None or any(p.error <= asked for p in points)
+    selected = cheapest(points, asked) if reached else None
+    say("error sources of the flight", methods)
+    parts = error_budget.errors(scene) if scene else []
+    cost = costs(scene, [tables_of(scene)])[0][:2] if scene and error_budget.has_contact(scene) else None
+    say("round-off", methods + 1)
+    return Study(target, problem, points, asked, selected, parts, round_off.measure(problem), cost)
 
 
 def show(screen: Console, study: Study) -> None:

@@ -10,7 +10,7 @@ from lapwing.flights.battery_use import WATT_HOUR
 from lapwing.flights.metrics import METRICS
 from lapwing.flights.tracking import DEGREE
 from lapwing.studies.campaign.results import Results
-from lapwing.studies.campaign.statistics import ellipse, groups, interval
+from lapwing.studies.campaign.statistics import ellipse, groups, interval, percent
 from lapwing.studies.campaign.verdict import ANY, MIN_RUNS, criteria, drivers, subject
 from lapwing.studies.campaign.verdict import varied_parameters as all_varied
 from lapwing.views.report.plot import Band, Line, Mark, NotRecordedError, Panel, Plot, Stretch
@@ -41,10 +41,11 @@ def criteria_plot(results: Results) -> Plot:
     bars = []
     for row in rows:
         share = 100.0 * row.failures / len(results)
-        label = "\n".join(textwrap.wrap(row.text, LANE))
-        bars.append(Stretch(label, 0.0, share, f"{row.failures}", BOUND))
-    bars.append(Stretch("any", 0.0, 100.0 * results.failure.value, "", BOUND))
-    shares = Panel(tuple(bars), "", "runs that fail [%]", timed=False, x_range=(0.0, 100.0))
+        label = "\n".join(textwrap.wrap(f"{row.text}: {row.failures}", LANE))
+        bars.append(Stretch(label, 0.0, share, "", BOUND))
+    largest = 100.0 * results.failure.value
+    bars.append(Stretch(f"any: {percent(results.failure)}", 0.0, largest, "", BOUND))
+    shares = Panel(tuple(bars), "", "runs that fail [%]", timed=False, x_range=(0.0, min(100.0, 1.2 * largest + 1.0)))
     metric = subject(results)
     caption = f"Runs that miss each criterion, of {len(results)}."
     if metric == ANY or metric not in results.figures:
@@ -166,8 +167,9 @@ def sensitivity(results: Results) -> Plot:
     Bars whose 95 % interval contains 0 are grey: chance explains them.
     """
     keys = varied_parameters(results)
-    targets = ["success"] if np.ptp(results["success"].astype(float)) > 0.0 else []
-    targets += [name for name in TARGETS if name in results.figures]
+    varying = [ANY] if np.ptp(results[ANY].astype(float)) > 0.0 else []
+    varying += results.figures
+    targets = [name for name in dict.fromkeys((subject(results), ANY, *TARGETS)) if name in varying]
     if not targets:
         raise NotRecordedError("equal results in all runs")
     independent = not results.folder.plan.sweep

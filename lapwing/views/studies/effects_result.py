@@ -42,7 +42,7 @@ def result(study: Study) -> StudyResult:
             _table("Effects of the scene, and the change without each", study, active=True),
             _table(f"Effects {absent}, and the change with each", study, active=False),
         ),
-        {"Influence of effects: needed, omittable (light), missing (orange), others (grey)": partial(_plot, study)},
+        {"Influence of effects": partial(_plot, study)},
         tuple(notes),
         data={**study._asdict(), "missing": [row.name for row in study.missing]},
     )
@@ -60,9 +60,9 @@ def _table(title: str, study: Study, active: bool) -> Rows:
 
 
 def _cost(difference: float, noise: float) -> str:
-    if abs(difference) <= noise:
+    if difference <= noise:  # without gravity or thrust the vehicle falls, and a step may take longer
         return f"< {noise:.2g}"
-    return f"{difference:.3g}" if abs(difference) < 999.5 else f"{difference:.0f}"  # without exponent
+    return f"{difference:.3g}" if difference < 999.5 else f"{difference:.0f}"  # without exponent
 
 
 def _changes(i: Influence) -> tuple[str, str, str]:
@@ -97,6 +97,9 @@ def _plot(study: Study) -> Plot:
         else:
             colour = BOUND if row in study.missing else QUIET
         marks.append(Stretch(name, MIN_BAR / 2.0, min(max(distance, MIN_BAR), longest), "", colour))
+    corner = np.full(2, MIN_BAR / 2.0), np.full(2, -0.5)  # place of lines without length, for the legend
+    legend = {"needed": FLOWN, "can be omitted": OMITTED, "(missing)": BOUND, "(not needed)": QUIET}
+    marks += [Line(*corner, name, colour) for name, colour in legend.items()]
     tolerance = np.full(2, study.within)
     marks.append(Line(tolerance, np.array([-0.5, len(rows) - 0.5]), f"tolerance {study.within:g} m", BOUND))
     label = "largest change of the trajectory [m]; beside the names: cost of a plant step, hovering"

@@ -48,7 +48,7 @@
     return { start: numbers(start) ? start : [0, 0], points: points?.every?.(numbers) ? points : null, areas, wind };
   }
 
-  let scale = 1, shift = [0, 0], reach = 5, held = null, tool = null;
+  let scale = 1, shift = [0, 0], middle = [0, 0], reach = 5, held = null, tool = null;
   const pixel = (place) => flat(place).map((value, k) => shift[k] + scale * value);
   const make = (kind, attributes, label = "") => {
     const node = document.createElementNS("http://www.w3.org/2000/svg", kind);
@@ -92,9 +92,9 @@
       change(name, k, { radius: Math.max(0.2, rounded(Math.hypot(x - at[0], y - at[1]))[0]) }));
     const move = (i) => ([x, y]) => change(name, k, { corners: tables(name)[k].corners.with(i, rounded(x, y)) });
     table.corners?.forEach((corner, i) => {
-      const middle = centre([corner, corners[(i + 1) % corners.length]]);
+      const between = centre([corner, corners[(i + 1) % corners.length]]);
       handle(corner, `edge corner ${css}`, "", move(i), corners.length > 3 ? () => change(name, k, { corners: corners.toSpliced(i, 1) }) : null);
-      handle(middle, `edge between ${css}`, "", move(i + 1), null, () => change(name, k, { corners: corners.toSpliced(i + 1, 0, middle) }));
+      handle(between, `edge between ${css}`, "", move(i + 1), null, () => change(name, k, { corners: corners.toSpliced(i + 1, 0, between) }));
     });
   }
 
@@ -104,20 +104,22 @@
     const all = [home, ...(route ?? []), ...areas.flatMap(({ corners, top }) => corners.flatMap(([x, y]) => [[x, y, 0], [x, y, top]]))];
     if (!held?.onMove) { // the view stays while something is dragged
       [ca, sa, ce, se] = [view.azimuth, view.elevation].flatMap((angle) => [Math.cos(angle), Math.sin(angle)]);
-      reach = Math.max(5, ...all.flatMap(([x, y]) => [Math.abs(x - x0), Math.abs(y - y0)])) * 1.2;
-      const ends = [...all, ...[-reach, reach].flatMap((a) => [-reach, reach].map((b) => [x0 + a, y0 + b, 0]))].map(flat);
+      const spans = [0, 1].map((k) => [Math.min(...all.map((place) => place[k])), Math.max(...all.map((place) => place[k]))]);
+      middle = spans.map(([least, most]) => Math.round((least + most) / 2));
+      reach = 1.2 * Math.max(5, ...spans.map(([least, most]) => (most - least) / 2));
+      const ends = [...all, ...[-reach, reach].flatMap((a) => [-reach, reach].map((b) => [middle[0] + a, middle[1] + b, 0]))].map(flat);
       const low = [0, 1].map((k) => Math.min(...ends.map((end) => end[k]))), high = [0, 1].map((k) => Math.max(...ends.map((end) => end[k])));
       scale = view.zoom * Math.min((WIDTH - 2 * MARGIN) / (high[0] - low[0]), (HEIGHT - 2 * MARGIN) / (high[1] - low[1]));
       shift = [WIDTH / 2 - scale * (low[0] + high[0]) / 2, HEIGHT / 2 - scale * (low[1] + high[1]) / 2];
     }
     svg.replaceChildren();
-    const step = 10 ** Math.floor(Math.log10(reach));
+    const step = 10 ** Math.floor(Math.log10(reach)), [cx, cy] = middle;
     for (let k = -Math.floor(reach / step); k <= reach / step; k++) {
-      line([[x0 + k * step, y0 - reach], [x0 + k * step, y0 + reach]], "polyline", "grid-line");
-      line([[x0 - reach, y0 + k * step], [x0 + reach, y0 + k * step]], "polyline", "grid-line");
+      line([[cx + k * step, cy - reach], [cx + k * step, cy + reach]], "polyline", "grid-line");
+      line([[cx - reach, cy + k * step], [cx + reach, cy + k * step]], "polyline", "grid-line");
     }
     make("text", { x: 8, y: HEIGHT - 8 }, `${step} m between the lines`);
-    for (const [at, label] of [[[x0 + reach, y0], "east"], [[x0, y0 + reach], "north"]]) {
+    for (const [at, label] of [[[cx + reach, cy], "east"], [[cx, cy + reach], "north"]]) {
       const [x, y] = pixel(at);
       make("text", { x, y, "text-anchor": "middle" }, label);
     }
@@ -131,7 +133,7 @@
     }
     if (input(START)) handle(home, "start", "start", ([x, y]) => write(START, rounded(x, y)));
     if (wind) {
-      const [u, v, w = 0] = wind.value, foot = [x0 - 0.7 * reach, y0 - 0.7 * reach, 0], tip = [foot[0] + WIND * u, foot[1] + WIND * v, 0];
+      const [u, v, w = 0] = wind.value, foot = [cx - 0.8 * reach, cy - 0.8 * reach, 0], tip = [foot[0] + WIND * u, foot[1] + WIND * v, 0];
       line([foot, tip], "polyline", "wind");
       handle(tip, "wind", `wind ${Math.hypot(u, v).toFixed(1)} m/s`,
         ([x, y]) => write(wind.name, [...rounded((x - foot[0]) / WIND, (y - foot[1]) / WIND), w]));

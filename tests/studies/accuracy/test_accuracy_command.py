@@ -147,7 +147,9 @@ def test_command_prints_cheapest_method(capsys, tmp_path, monkeypatch):
     problem = find("os4_experiment_1")
     few = [method for method in problem.methods if method.name in ("rkmk54", "lie_euler", "erk4m")]  # each is compiled
     monkeypatch.setattr(accuracy_command, "find", lambda target: problem._replace(methods=few))
-    result = accuracy_command.study(accuracy_command.console(), "os4_experiment_1", [], 1e-3)
+    said = []
+    result = accuracy_command.study("os4_experiment_1", [], 1e-3, lambda *parts: said.append(parts))
+    assert [(done, total) for _, done, total in said] == [(k, len(few) + 2) for k in (0, *range(len(few) + 2))]
     accuracy_command.show(accuracy_command.console(), result)
     accuracy_command.write_json(tmp_path / "a.json", result)
     printed = capsys.readouterr().out
@@ -167,7 +169,7 @@ def test_scene_with_contact_has_error_sources_and_cost(capsys, monkeypatch):
         return problem._replace(methods=[m for m in problem.methods if m.name in ("rk4_renormalised", "rkmk4")])
 
     monkeypatch.setattr(accuracy_command.scenes, "problem", two_methods)
-    result = accuracy_command.study(accuracy_command.console(), "hover", ["run.duration=0.2"], 1e-3)
+    result = accuracy_command.study("hover", ["run.duration=0.2"], 1e-3)
     accuracy_command.show(accuracy_command.console(), result)
     assert result.selected.error <= 1e-3
     assert min(result.cost) > 0.0
