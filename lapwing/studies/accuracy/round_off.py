@@ -21,7 +21,7 @@ from lapwing.studies.accuracy.problem import Problem
 
 STEPS = 400  # at least
 METHOD = "rk4_renormalised"
-_MATH = SimpleNamespace(**FUNCTIONS, pi=math.pi, tau=math.tau, inf=math.inf)
+_MATH = SimpleNamespace(**FUNCTIONS, pi=math.pi, tau=math.tau, inf=math.inf, nan=math.nan)
 
 
 class RoundOff(NamedTuple):
