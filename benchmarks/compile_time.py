@@ -18,6 +18,7 @@ FOUR = {  # more effects than the scene has
     "effects.gyroscopic_torque": {},
     "effects.wind_constant.velocity": [1.0, 0.0, 0.0],
 }
+OWN = {"effects.my_drag.module": "my_drag"}
 EULER = {"vehicle.model": "multibody", "multibody.coordinates": "euler", "run.duration": 0.1}
 # Flights: function of `lapwing`, its arguments, and target [s]; those of one group share a cache.
 GROUPS = (
@@ -43,9 +44,19 @@ def hover(environment):
     imports, _ = cost(environment, "import numba, numpy, mcap")
     cold, memory = cost(environment, "import lapwing; lapwing.fly('hover')")
     four, warm = (cost(environment, f"import lapwing; lapwing.fly('hover', {FOUR})")[0] for _ in range(2))
+    with tempfile.TemporaryDirectory() as folder:
+        subprocess.run(
+            [sys.executable, "-m", "lapwing", "new", "effect", "my_drag"],
+            cwd=folder,
+            check=True,
+            stdout=subprocess.DEVNULL,
+        )
+        own = {**environment, "PYTHONPATH": os.pathsep.join([os.getcwd(), folder])}
+        first, again = (cost(own, f"import lapwing; lapwing.fly('hover', {OWN})")[0] for _ in range(2))
     yield Row("hover, cold, processor time", cold, "s", 12.0)
     yield Row("hover, cold / importing numba, numpy and mcap", cold / imports, "", 30.0)
     yield Row("hover, four more effects / the same again", four / warm, "", 2.0)
+    yield Row("hover, own effect / the same again", first / again, "", 2.0)
     yield Row("hover, cold, peak memory", memory, "MB", 300.0)
 
 
