@@ -30,6 +30,6 @@ def test_package_data_covers_shipped_kernels():
 def test_make_prints_set_up_steps_without_durations(tmp_path):
     command = ["make", "--dry-run", "mission", f"VENV={tmp_path}/venv"]
     lines = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=True).stdout
-    assert "-m pip install" in lines
-    assert "quiet" not in lines
+    first, *_ = (line for line in lines.splitlines() if "-m pip install" in line)
+    assert "quiet" not in first  # the last installation is: kernels are compiled meanwhile, in one line
     assert "minute" not in lines

@@ -152,9 +152,9 @@ def precompile(
         typer.Argument(metavar="[SCENE|FOLDER]...", help="scenes, or folders of scenes [delivery_mission]"),
     ] = None,
 ) -> None:
-    """Compile the kernels of scenes ahead of their first run, on all cores.
+    """Compile the kernels of scenes ahead of their first run.
 
-    Invalid scenes are reported and skipped.
+    All cores compile. Invalid scenes are reported and skipped.
     """
     from lapwing.runs.precompile import compile_ahead
     from lapwing.services.scene_resolver import resolve

@@ -1,5 +1,6 @@
 """Events of arming, take-off, landing, flight modes, failsafes and failures, of ground contact and motor saturation."""
 
+import re
 from collections.abc import Iterator
 
 from lapwing.messages.topics import TRUTH
@@ -132,7 +133,7 @@ class FlightDetector:
                 yield DISARMED, (place,)
 
 
-_CAUSES = tuple(Entry(k, reason.replace(" ", "_"), reason) for k, reason in enumerate(status_texts.FAILSAFES))
+_CAUSES = tuple(Entry(k, re.sub(r"\W", "_", reason), reason) for k, reason in enumerate(status_texts.FAILSAFES))
 _cause = Argument("cause", Enumeration("failsafe_cause_t", "uint8_t", _CAUSES))
 
 FAILSAFE = event(

@@ -16,7 +16,7 @@ ANOMALY = "environment.magnetic_anomaly=[2e-6,-1e-6,3e-6]"
 
 def test_magnetic_anomaly_affects_sensors_only():
     services = resolve(load("quad_x", [ANOMALY])).services
-    measured = services["sensors"].parameters[0].around.magnetic_field_world
+    measured = services["sensors"].parameters[0].environment.magnetic_field_world
     model_field = services["autopilot"].parameters.estimator.magnetic_field_world
     assert model_field == STANDARD.magnetic_field_world
     assert np.subtract(measured, model_field) == pytest.approx((2e-6, -1e-6, 3e-6))

@@ -37,7 +37,7 @@ def test_all_services_share_environment():
     air = next(effect for effect in active(scene) if hasattr(effect, "atmosphere"))
     assert air.initial_discrete_state()[0] == density(around.atmosphere, 1600.0)
     instruments = config.services["sensors"].parameters
-    assert {instrument.around.home for instrument in instruments} == {around.home}
+    assert {instrument.environment.home for instrument in instruments} == {around.home}
     filter_ = config.services["autopilot"].parameters.estimator
     assert (filter_.home, filter_.atmosphere, filter_.gravity) == (around.home, around.atmosphere, around.gravity)
     assert filter_.magnetic_field_world == around.magnetic_field_world != STANDARD.magnetic_field_world

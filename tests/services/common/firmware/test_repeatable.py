@@ -3,6 +3,7 @@
 import hashlib
 import os
 import shutil
+import signal
 import socket
 import subprocess
 import sys
@@ -72,7 +73,7 @@ class Simulator:
         )  # fmt: skip
         stack.callback(self.process.stdout.close)
         stack.callback(self.process.wait)
-        stack.callback(self.process.kill)
+        stack.callback(os.killpg, self.process.pid, signal.SIGKILL)  # also the clients of its start script
         self.peer = (HOST, state)
         self.socket.settimeout(PATIENT)
         if kind == "connect":
