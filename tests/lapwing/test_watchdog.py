@@ -59,11 +59,11 @@ BLOCK = "block autopilot.controller did not return"
 TIMEOUT = 300.0  # [s] for a machine of load 20; idle, each command ends within 5 s
 
 
-def end(folder, hang, number, *command, hanging=1, calls="100"):
+def end(folder, hang, number, *command, hanging=1, calls="100", by=()):
     """Run a command until its controller hangs, and send it a signal. Return its exit code, error and time [s]."""
     (folder / "hanging.py").write_text(f"{CONTROLLER}\n\ndef calls():\n    return {calls}\n")
     environment = os.environ | {"PYTHONPATH": f"{Path.cwd()}:{folder}", "HANG": hang}
-    arguments = [sys.executable, "-m", "lapwing", *command, "--set", "autopilot.controller=hanging:Hanging"]
+    arguments = [*by, sys.executable, "-m", "lapwing", *command, "--set", "autopilot.controller=hanging:Hanging"]
     process = subprocess.Popen(
         arguments, cwd=folder, env=environment, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True
     )
@@ -92,7 +92,8 @@ def end(folder, hang, number, *command, hanging=1, calls="100"):
     ],
 )
 def test_signal_ends_run_whose_block_hangs(tmp_path, record_property, mode, hang, number, whole):
-    code, error, seconds = end(tmp_path, hang, number, "run", "hover", "--mode", mode, "--log", "flight.mcap")
+    options = ["run", "hover", "--mode", mode, "--log", "flight.mcap"]
+    code, error, seconds = end(tmp_path, hang, number, *options, by=["nohup"] if hang == "library_with_gil" else [])
     record_property("seconds", seconds)
     service = "autopilot: " if mode == "multi-process" else ""
     assert (code, error) == (128 + number, f"lapwing: ended by {number.name}; {service}{BLOCK}\n")

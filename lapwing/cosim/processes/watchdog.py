@@ -19,6 +19,7 @@ import numpy as np
 from lapwing.cosim.diagram.compiled_loop import COMPILING, IDLE, NAMES, RUNNING
 from lapwing.cosim.processes.interrupt import ENDING, Interrupted
 from lapwing.cosim.processes.patience import EXTENSION
+from lapwing.cosim.run_errors import END_SIGNAL
 from lapwing.kernels import always_inline, kernel
 from lapwing.kernels.native_calls import address_of, call_int, call_long, poll_entry
 
@@ -108,7 +109,8 @@ def _watch_data(pipe: int, limit: float, idle_limit: float) -> Watch:
         schedule = os.open(f"/proc/self/task/{threading.get_native_id()}/schedstat", os.O_RDONLY | os.O_CLOEXEC)
     except OSError:  # the system has no such file
         schedule = -1
-    starts = [f"lapwing: {Interrupted(n)}; " if n in ENDING else "" for n in range(signal.NSIG)]
+    ending = {*ENDING, END_SIGNAL}  # a service gets the second from its launcher, also where nohup ignores SIGHUP
+    starts = [f"lapwing: {Interrupted(n)}; " if n in ending else "" for n in range(signal.NSIG)]
     words = _table(["block ", " did not return\n", "the program did not end by itself\n", "compiling kernels of "])
     arrays = [poll_entry(pipe), np.zeros(64, np.uint8), np.zeros(2, np.int64), np.zeros(256, np.uint8)]
     functions = (libc.read, libc.pread, libc.poll, libc.write, libc._exit, libc.clock_gettime)
