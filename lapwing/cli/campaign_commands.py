@@ -271,7 +271,8 @@ def _fly(
             nonlocal previous
             previous = count.runs if previous < 0 else previous
             finished, rate = count.runs - previous, (count.runs - previous) / max(time.monotonic() - start, 1e-9)
-            text = f"{rate:.1f} runs/s, {count.failures} failures, {percent(count.failure)}"
+            share = f", {percent(count.failure)}" if count.accepted else ""
+            text = f"{rate:.1f} runs/s, {count.failures} failures{share}"
             progress.say(text, before + finished, own_runs)
 
         study(folder, first, workers, say, until, part)

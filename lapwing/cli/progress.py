@@ -1,5 +1,6 @@
 """Progress of a run and of a study: a bar in a terminal, otherwise occasional lines."""
 
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -151,9 +152,17 @@ class StudyProgress(_TerminalBar):
 
 @contextmanager
 def step_progress(console: Console, unit: str, parallel: int = 0) -> Iterator[Callable[[str, int, int], None]]:
-    """Yield `StudyProgress.say` of a bar; without a terminal it shows nothing."""
-    if not console.is_terminal:
-        yield lambda text, done, total: None
+    """Yield `StudyProgress.say` of a bar; without a terminal it prints its first text to standard error, once."""
+    if console.is_terminal:
+        with StudyProgress(console, unit, parallel) as progress:
+            yield progress.say
         return
-    with StudyProgress(console, unit, parallel) as progress:
-        yield progress.say
+    started = False
+
+    def begin(text: str, _done: int, _total: int) -> None:
+        nonlocal started
+        if text and not started:
+            started = True
+            print(f"{text} ...", file=sys.stderr, flush=True)
+
+    yield begin

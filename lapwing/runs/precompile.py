@@ -1,5 +1,6 @@
 """Compilation of kernels ahead of the first run."""
 
+import sys
 import time
 from collections.abc import Mapping
 
@@ -25,7 +26,7 @@ def compile_ahead(configs: Mapping[str, RunConfig], console: Console, workers: W
 
     Args:
         configs: run configurations by the name to print.
-        console: shows a bar if it is a terminal.
+        console: shows a bar if it is a terminal; otherwise a line on standard error begins the work.
         workers: compile services beside each other.
     """
     started = time.perf_counter()
@@ -33,6 +34,8 @@ def compile_ahead(configs: Mapping[str, RunConfig], console: Console, workers: W
     tasks = [(c, name) for c in configs.values() for name in sorted(c.order, key=lambda name: name != CLOCK_OWNER)]
     text = TextColumn("kernels of {task.completed} of {task.total} services  {task.description}", markup=False)
     columns = (BarColumn(bar_width=24), TimeElapsedColumn(), text)
+    if not console.is_terminal:
+        print(f"compiling or loading the kernels of {len(tasks)} services ...", file=sys.stderr, flush=True)
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("", total=len(tasks))
         for _, compiled in workers(compile_service, tasks):

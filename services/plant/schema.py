@@ -34,7 +34,7 @@ class Solver(SceneTable):
     TABLE: ClassVar[str] = "solver"
     integrator: str = "rk4_renormalised"  # a module of lapwing/dynamics/integrators
     step: float = Field(default=0.001, ge=1e-9)  # [s], divides the communication step
-    accuracy: float | None = Field(default=None, ge=1e-12)  # maximum error, for which step and integrator are selected
+    accuracy: float | None = Field(default=None, ge=1e-12)  # maximum error relative to 1 + size; selects the solver
 
     @field_validator("integrator")
     @classmethod

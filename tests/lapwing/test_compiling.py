@@ -72,7 +72,7 @@ def test_terminal_has_bar_and_other_streams_have_line():
 
 
 @pytest.mark.parametrize("terminal", [True, False])
-def test_precompile_shows_bar_or_one_line_per_scene(config, monkeypatch, terminal):
+def test_precompile_shows_bar_or_lines(config, monkeypatch, capsys, terminal):
     monkeypatch.setattr(precompile, "BlockDiagram", Compiling)
     console = Console(file=io.StringIO(), force_terminal=terminal, width=100, markup=False)
     compile_ahead({"one": config, "two": config}, console, run_here)
@@ -80,6 +80,7 @@ def test_precompile_shows_bar_or_one_line_per_scene(config, monkeypatch, termina
     assert output.count("ready after") == 2
     assert ("kernels of 6 of 6 services  hover " in output) == terminal
     assert len(output.splitlines()) == 2 or terminal
+    assert capsys.readouterr().err == ("" if terminal else "compiling or loading the kernels of 6 services ...\n")
 
 
 def test_precompile_begins_with_plant_and_compiles_each_service_once(config, monkeypatch):

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from lapwing.cli.progress import StudyProgress
+from lapwing.cli.progress import StudyProgress, step_progress
 from lapwing.runs.work_progress import TimeLeft, WorkProgress
 
 
@@ -138,3 +138,10 @@ def test_terminal_has_bar_and_other_streams_have_lines(terminal, expected):
         if countdown._bar:
             countdown._bar.refresh()
         assert re.search(expected, console.file.getvalue())
+
+
+def test_study_without_terminal_names_first_part_on_standard_error(capsys):
+    with step_progress(Console(file=io.StringIO()), "parts") as say:
+        for done, text in enumerate(("", "measuring reference", "measuring rkmk4")):
+            say(text, done, 3)
+    assert capsys.readouterr() == ("", "measuring reference ...\n")

@@ -61,7 +61,7 @@ def explain(folder: Path, run: int, progress: Callable[[str, int, int], None] = 
 
     def fly(values: Mapping[str, Any]) -> Row:
         if (key := repr(sorted(values.items()))) not in flown:
-            progress(f"{len(values)} of {len(plan.keys)} parameters", len(flown) + 1, most)
+            progress(f"flying with {len(values)} of {len(plan.keys)} drawn values", len(flown) + 1, most)
             flown[key] = row_of(plan, run, values=values)
         return flown[key]
 

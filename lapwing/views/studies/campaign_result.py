@@ -96,14 +96,14 @@ def _tables(results: Results) -> list[Rows]:
 
 
 def _criteria(results: Results) -> Rows:
-    rows = Rows("Criteria of success", "criterion", "failed", "", "median", "worst", "run", texts=("",))
+    rows = Rows("Criteria of success", "criterion", "failed", "median", "worst", "run", "", texts=("",))
     for row in criteria(results):
         share = row.failures / len(results)
         bar = "█" * max(round(BAR * share), row.failures > 0)
         spread = results.spread(row.metric) if row.metric in results.columns else None  # in the unit of the limit
         numbers = (digits(spread.median), digits(spread.worst), str(spread.run)) if spread else ("",) * 3
         text = "\n".join(wrap(row.text, 30))
-        rows.add(text, str(row.failures), bar.ljust(BAR, "░"), *numbers, failed=row.failures > 0)
+        rows.add(text, str(row.failures), *numbers, bar, failed=row.failures > 0)
     return rows
 
 

@@ -11,6 +11,7 @@ from lapwing.studies.stability.case_runner import Result
 from lapwing.views.report import plot as report_plot
 from lapwing.views.report.style import COLOURS
 from lapwing.views.studies.study_result import Rows, StudyResult
+from lapwing.views.terminal import counted
 
 TEXTS = ("invariant", "method", "baseline method")
 HEADS = ("invariant", "method", "bound", "measured", "margin", "verdict", "baseline method", "its result")
@@ -27,7 +28,7 @@ def result(results: Sequence[Result]) -> StudyResult:
             title = f"{each.case}: difficulty at which each method breaks"
             plots[title] = partial(_plot, each.sweep.plot(), "; ".join(_breaks(each.sweep)))
     return StudyResult(
-        f"Numerical stability: {len(results)} hard cases", verdict, "bad" if failing else "good",
+        f"Numerical stability: {counted(len(results), 'hard case')}", verdict, "bad" if failing else "good",
         ("each result with its bound, and the result of a baseline method on the same case",),
         tuple(map(_rows, results)), plots,
         tuple(f"{each.case}: {line}" for each in results if each.sweep for line in _breaks(each.sweep)),

@@ -137,7 +137,7 @@ def test_two_machines_may_create_folder_at_once(tmp_path, monkeypatch):
 def test_shard_option_flies_part_of_runs(complete, tmp_path):
     arguments = ["campaign", "hover", "--set", "run.duration=0.5", "--runs", 5, "--workers", 1, "--out", tmp_path / "c"]
     code, output = run_lapwing(*arguments, "--shard", "2/2")
-    assert (code, "2 of 2 flights" in output, "3 shards missing" in output) == (0, True, True)
+    assert (code, "2 of 2 flights" in output, "3 shards missing" in output, "nan" in output) == (0, True, True, False)
     run_arguments = [
         "run", "hover", "--set", "run.duration=0.5", "--campaign", tmp_path / "c", "--mode", "single-process",
     ]  # fmt: skip
