@@ -238,7 +238,6 @@ def tune(
         def show(text: str, done: int = 0) -> None:
             progress(text, done, gain_refinement.GAIN_SETS)
 
-        show("linearising")
         with notify_on_compile(resolve(loaded), lambda _: show("compiling, then flying")):
             result = procedure.tune(
                 loaded,

@@ -34,7 +34,7 @@ def compile_ahead(configs: Mapping[str, RunConfig], console: Console, workers: W
     tasks = [(c, name) for c in configs.values() for name in sorted(c.order, key=lambda name: name != CLOCK_OWNER)]
     text = TextColumn("kernels of {task.completed} of {task.total} services  {task.description}", markup=False)
     columns = (BarColumn(bar_width=24), TimeElapsedColumn(), text)
-    if not console.is_terminal:
+    if tasks and not console.is_terminal:
         print(f"compiling or loading the kernels of {len(tasks)} services ...", file=sys.stderr, flush=True)
     with Progress(*columns, console=console, transient=True, disable=not console.is_terminal) as bar:
         task = bar.add_task("", total=len(tasks))
