@@ -151,8 +151,18 @@ class StudyProgress(_TerminalBar):
 
 
 @contextmanager
-def step_progress(console: Console, unit: str, parallel: int = 0) -> Iterator[Callable[[str, int, int], None]]:
-    """Yield `StudyProgress.say` of a bar; without a terminal it prints its first text to standard error, once."""
+def step_progress(
+    console: Console, unit: str, parallel: int = 0, announced: bool = False
+) -> Iterator[Callable[[str, int, int], None]]:
+    """Yield `StudyProgress.say` of a bar; without a terminal it is silent.
+
+    Args:
+        console: where the bar is shown.
+        unit: what is counted.
+        parallel: number of units that proceed at once, 0 for unknown.
+        announced: print the first text to standard error where there is no terminal: no error follows that a user can
+            make, which would not be the only line.
+    """
     if console.is_terminal:
         with StudyProgress(console, unit, parallel) as progress:
             yield progress.say
@@ -161,7 +171,7 @@ def step_progress(console: Console, unit: str, parallel: int = 0) -> Iterator[Ca
 
     def begin(text: str, _done: int, _total: int) -> None:
         nonlocal started
-        if text and not started:
+        if announced and text and not started:
             started = True
             print(f"{text} ...", file=sys.stderr, flush=True)
 

@@ -144,7 +144,7 @@ def accuracy(
     console = accuracy_command.console()
 
     def find() -> accuracy_command.Study:
-        with step_progress(console, "parts", 1) as progress:
+        with step_progress(console, "parts", 1, announced=True) as progress:
             return accuracy_command.study(target, set_ or [], goal, progress)
 
     _study("TARGET", Path(target), json, plot, console, find, accuracy_command)

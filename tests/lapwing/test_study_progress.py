@@ -140,8 +140,9 @@ def test_terminal_has_bar_and_other_streams_have_lines(terminal, expected):
         assert re.search(expected, console.file.getvalue())
 
 
-def test_study_without_terminal_names_first_part_on_standard_error(capsys):
-    with step_progress(Console(file=io.StringIO()), "parts") as say:
+@pytest.mark.parametrize(("announced", "expected"), [(True, "measuring reference ...\n"), (False, "")])
+def test_announced_study_without_terminal_names_first_part_on_standard_error(capsys, announced, expected):
+    with step_progress(Console(file=io.StringIO()), "parts", announced=announced) as say:
         for done, text in enumerate(("", "measuring reference", "measuring rkmk4")):
             say(text, done, 3)
-    assert capsys.readouterr() == ("", "measuring reference ...\n")
+    assert capsys.readouterr() == ("", expected)
