@@ -35,6 +35,10 @@ def _translate_action(name: str, counterpart: str, actions: dict[int, int], defa
     return Fact(name, lambda v: px4_actions.get(int(v.get(counterpart, NOTHING)), default), assign=assign)
 
 
+def _constant(value: int) -> Callable[[Values], float]:
+    return lambda _: float(value)
+
+
 def _setting(name: str, default: int, allowed: Collection[int], at_reboot: bool = False) -> Fact:
     """Return a setting of the link, which has no counterpart in the autopilot."""
     return Fact(name, lambda _: float(default), assign=lambda x: {} if x in allowed else None, at_reboot=at_reboot)
@@ -130,7 +134,7 @@ def px4_facts(d: VehicleDescription) -> Sequence[Fact]:
         _setting(SYSTEM_ID, d.system_id, _IDS, at_reboot=True),
         _setting(COMPONENT_ID, mavlink.MAV_COMP_ID_AUTOPILOT1, _IDS, at_reboot=True),
         _setting(TYPE, own_type, {own_type, *_MULTIROTORS}),
-        *[Fact(name, lambda _, value=value: float(value)) for name, value in integers.items()],  # type: ignore[misc]
+        *[Fact(name, _constant(value)) for name, value in integers.items()],
         *[Fact(f"SENS_BOARD_{axis}_OFF", lambda _: 0.0, False, "deg") for axis in "XYZ"],
         *(_battery(d.battery) if d.battery else ()),
         *[Fact(f"RC_{switch}_TH", lambda _: THRESHOLD, False) for switch in NO_THRESHOLDS],

@@ -180,7 +180,7 @@ def test_service_that_is_killed_is_named_in_the_report(tmp_path):
     assert found[1] in (tmp_path / "a.html").read_text()
 
 
-def test_termination_at_maximum_height_names_it_and_lasts_until_the_impact(lapwing):
+def test_motors_stopped_at_maximum_height_are_cause_of_crash(lapwing):
     fence = ("autopilot.parameters.FS_FENCE_ACT=5", "autopilot.parameters.GF_MAX_VER_DIST=4.0")
     climb = 'trajectory.phase.0.z={kind="minimum_jerk", to=8.0, duration=4.0}'
     words, reported, (flight,), _ = crash(lapwing, "hover", *[a for x in (*fence, climb) for a in ("--set", x)])

@@ -141,7 +141,7 @@ def test_terminal_has_bar_and_other_streams_have_lines(terminal, expected):
 
 
 @pytest.mark.parametrize(("announced", "expected"), [(True, "measuring reference ...\n"), (False, "")])
-def test_announced_study_without_terminal_names_first_part_on_standard_error(capsys, announced, expected):
+def test_only_announced_study_prints_a_line_without_terminal(capsys, announced, expected):
     with step_progress(Console(file=io.StringIO()), "parts", announced=announced) as say:
         for done, text in enumerate(("", "measuring reference", "measuring rkmk4")):
             say(text, done, 3)

@@ -11,16 +11,14 @@ from lapwing.dynamics.geodesy import Home, geodetic_to_enu
 from lapwing.dynamics.validation import Table, validated
 from lapwing.kernels import python_function
 
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-
 
 class PlaceTable(Table):
     """A place as a table: in metres or on the Earth."""
 
     model_config = ConfigDict(strict=False)
 
-    x: Finite | None = None  # [m] along world x (east), of a waypoint from the start
-    y: Finite | None = None  # [m] along world y (north)
+    x: float | None = None  # [m] along world x (east), of a waypoint from the start
+    y: float | None = None  # [m] along world y (north)
     latitude_deg: Annotated[float, Field(ge=-90.0, le=90.0)] | None = None  # [deg] with longitude_deg, instead of x, y
     longitude_deg: Annotated[float, Field(ge=-180.0, le=180.0)] | None = None  # [deg] east
 

@@ -263,7 +263,7 @@ def test_user_places_and_removes_fences_buildings_and_waypoints(start, tmp_path)
     assert after["trajectory"]["waypoints"] == [[6.0, 0.0, 3.0], [6.0, 4.0, 4.0]]
 
 
-def test_added_wind_has_values_and_a_table_that_does_not_fit_keeps_the_form(start, tmp_path):
+def test_form_stays_if_added_effect_does_not_fit(start, tmp_path):
     studio = start(tmp_path)
     page = studio.page("scenes/hover?add=effects.wind_constant")
     assert 'name="effects.wind_constant.velocity" value="[0.0, 0.0, 0.0]"' in page
