@@ -31,8 +31,8 @@ def repeated(flight, times):
 @pytest.mark.long
 @pytest.mark.parametrize("name", ["f.bin", "f.tlog"])
 def test_memory_is_bounded_by_a_multiple_of_the_file(tmp_path, flight, name):
-    files = [tmp_path / f"{k}{name}" for k in (1, 20)]
-    for path, times in zip(files, (1, 20), strict=True):
+    files = [tmp_path / f"{k}{name}" for k in (1, 80)]
+    for path, times in zip(files, (1, 80), strict=True):
         WRITERS[name](path, repeated(flight, times))
     done = subprocess.run([sys.executable, "-c", PEAKS, *map(str, files)], capture_output=True, text=True, check=True)
     small, large = (1024 * int(line) for line in done.stdout.split())
