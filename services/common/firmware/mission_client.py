@@ -25,6 +25,10 @@ STATE_EVERY = 200_000.0  # [us] between two EXTENDED_SYS_STATE
 REJECTIONS = 20  # rejected uploads, one per second, after which the flight fails
 CELLS_UNKNOWN, TEMPERATURE_UNKNOWN = 65535, 32767  # in BATTERY_STATUS
 BAD_DATA = -1  # id of the decoder for bytes that are no message
+READY = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+READY_FOR = 1.0  # [s] ready before its mode changes: PX4 completes its home position meanwhile, in a mission no longer
+PATIENCE = 30.0  # [s] after the upload, after which a firmware that is not ready is asked why
+CHUNK = 50  # characters of a full STATUSTEXT
 STOPS = 4  # most messages that one poll asks the firmware to stop
 
 
@@ -82,7 +86,7 @@ class MissionClient:
         self._codec = mavlink.MAVLink(None, srcSystem=SYSTEM, srcComponent=COMPONENT)
         self._codec.robust_parsing = True
         self._others = set[int]()  # ids of messages without a handler
-        self.next_poll = self._beat = -1.0  # [s] of the next poll, heartbeat
+        self.next_poll = self._beat = self._time = -1.0  # [s] of the next poll, heartbeat, and of this poll
         self.version = ""
         self._reset()
 
@@ -93,10 +97,12 @@ class MissionClient:
         self._stopped = set[int]()  # ids of messages that the firmware was asked to stop
         self._sent = -1.0  # [s] of the last request
         self._in_mode = False
+        self._arms_from = math.inf  # [s] from when on it arms without being ready, since the rejection names reasons
+        self._ready_at = -math.inf  # [s] since when the firmware has been ready, inf: it is not
         self._rejections = 0
         self.stage = Stage.CONNECTING
         self.armed, self.landed, self.mode, self.error = False, True, "", ""
-        self.texts = StatusTexts()
+        self.texts, self._chunk = StatusTexts(), ""
 
     def restart(self) -> None:
         """Start over after a restart of the firmware, which has lost its state; discard its earlier messages."""
@@ -107,7 +113,7 @@ class MissionClient:
         """Read and answer messages at simulation `time` [s]."""
         if time < self.next_poll - ROUND_OFF:
             return
-        self.next_poll = time + POLL_EVERY
+        self.next_poll, self._time = time + POLL_EVERY, time
         self.read()
         self._stop_others()
         if time >= self._beat:
@@ -187,6 +193,8 @@ class MissionClient:
         if self.stage is Stage.UPLOADING:
             count = len(self._items) + self._conventions.home_first
             self._send(mavlink.MAVLink_mission_count_message(self._target, 1, count))
+        elif self.stage is Stage.ARMING and self._time < min(self._ready_at, self._arms_from) + READY_FOR:
+            self._command(mavlink.MAV_CMD_RUN_PREARM_CHECKS)  # names what is missing
         elif self.stage is Stage.ARMING and self._in_mode:
             self._command(mavlink.MAV_CMD_COMPONENT_ARM_DISARM, 1.0)
         elif self.stage is Stage.ARMING:
@@ -221,6 +229,10 @@ class MissionClient:
     def _on_extended_sys_state(self, message: Any) -> None:
         self.landed = message.landed_state == mavlink.MAV_LANDED_STATE_ON_GROUND
 
+    def _on_sys_status(self, message: Any) -> None:
+        ready = message.onboard_control_sensors_health & READY
+        self._ready_at = min(self._ready_at, self._time) if ready else math.inf
+
     def _on_param_value(self, message: Any) -> None:
         self._parameters.receive(message)
 
@@ -249,6 +261,7 @@ class MissionClient:
             return
         if message.type == mavlink.MAV_MISSION_ACCEPTED:
             self._advance(Stage.ARMING)
+            self._arms_from = self._time + PATIENCE
             return
         self._rejections += 1  # ArduPilot has no space for a mission until it has started
         if self._rejections > REJECTIONS:
@@ -271,8 +284,10 @@ class MissionClient:
             self.texts.add_event(text)
 
     def _on_statustext(self, message: Any) -> None:
-        text = message.text.rstrip("\0").strip()  # PX4 ends texts that it also sends as events with a tab
-        self.texts.add(text, message.severity, self.armed, self.stage is Stage.ARMING)
+        self._chunk = message.text if message.id == 0 or message.chunk_seq == 0 else self._chunk + message.text
+        if message.id == 0 or len(message.text) < CHUNK:  # else another chunk follows
+            text = self._chunk.strip()  # PX4 ends texts that it also sends as events with a tab
+            self.texts.add(text, message.severity, self.armed, self.stage is Stage.ARMING)
 
 
 def poll_flight(report: LinkReport, client: MissionClient, time: float) -> FirmwareOutput:

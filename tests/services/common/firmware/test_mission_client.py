@@ -122,6 +122,31 @@ def test_mission_is_uploaded_and_started():
     assert (mode.target_system, mode.param1, mode.param2, mode.param3) == (7, 1, 4, 4)
 
 
+def test_firmware_is_ready_for_a_second_before_its_mode_changes():
+    vehicle, client = (v := Vehicle()), make(v)
+    for ready, seconds in ((False, 2.0), (True, 0.9), (False, 0.5)):
+        status = [0, 0, mavlink.MAV_SYS_STATUS_PREARM_CHECK * ready, *[0] * 10]
+        vehicle.emit(mavlink.MAVLink_sys_status_message(*status))
+        fly(vehicle, client, seconds, max(client.next_poll, 0.0))
+    commands = {message.command for message in vehicle.sent if message.get_type() == "COMMAND_LONG"}
+    assert mavlink.MAV_CMD_RUN_PREARM_CHECKS in commands
+    assert commands.isdisjoint({mavlink.MAV_CMD_DO_SET_MODE, mavlink.MAV_CMD_COMPONENT_ARM_DISARM})
+    status[2] = mavlink.MAV_SYS_STATUS_PREARM_CHECK
+    vehicle.emit(mavlink.MAVLink_sys_status_message(*status))
+    fly(vehicle, client, 5.0, client.next_poll)
+    assert client.stage is Stage.FLYING
+
+
+def test_long_status_text_is_one_text():
+    vehicle, client = (v := Vehicle(arm_rejections=99)), make(v)
+    fly(vehicle, client, 3.0)
+    text = "Arming denied: Resolve system health failures first\t"
+    for number, chunk in enumerate((text[:50], text[50:])):
+        vehicle.emit(mavlink.MAVLink_statustext_message(3, chunk.encode(), 5, number))
+    client.read()
+    assert text.strip() in client.texts.blockers
+
+
 def test_ardupilot_has_home_first_and_no_nan():
     vehicle = Vehicle()
     fly(vehicle, make(vehicle, ardupilot.CONVENTIONS), 3.0)
