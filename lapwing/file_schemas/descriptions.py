@@ -18,6 +18,10 @@ PRESETS = {  # by sensor; the comments above the presets have the data sheets, a
         "realsense_d435": "Intel RealSense D435, 0.3 to 10 m",
         "realsense_d455": "Intel RealSense D455, 0.6 to 20 m",
     },
+    "external_vision": {
+        "motion_capture": "cameras in the room, about 1 mm",
+        "odometry": "a camera on board, about 2 cm, 40 ms late",
+    },
     "gps": {
         "rtk": "u-blox ZED-F9P with corrections, about 2 cm",
         "standard": "u-blox NEO-M8 without corrections, about 2.5 m",

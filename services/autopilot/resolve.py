@@ -6,6 +6,7 @@ from collections.abc import Callable
 from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.scene import Scene
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.terrain import Level, surface
 from lapwing.services.autopilot import estimator
 from lapwing.services.autopilot.custom.user_code_loader import controller_rate, estimator_rate, vehicle_model
@@ -40,6 +41,9 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         sensors.remove(ports.RANGEFINDER)
     inputs = [InputPort(ports.TRUTH)] if exact else [InputPort(name) for name in (installed if user_code else sensors)]
     gyro_range = math.radians(scene.lookup("sensors.imu.gyro").range_dps) if ports.IMU in sensors else math.inf
+    for name in (ports.GPS, ports.MAGNETOMETER):
+        if name in sensors and scene.lookup(f"sensors.{name}.instances") > 1:
+            raise ConfigError(f"sensors.{name}.instances", "Lapwing's autopilot uses one", "1, or a firmware with more")
     imus = scene.lookup("sensors.imu.instances") if ports.IMU in sensors else 1
     inputs += [InputPort(name) for name in ports.IMUS[1:imus]]
     if ports.AIRSPEED in installed and settings.accept_commands and not user_code:

@@ -12,8 +12,10 @@ from lapwing.dynamics.vector import ZERO, Vec3
 TRUTH, BATTERY, BODIES, CONTACT = "truth", "battery", "bodies", "contact"
 IMU, MAGNETOMETER, GPS, BAROMETER, SONAR = "imu", "magnetometer", "gps", "barometer", "sonar"
 IMUS = (IMU, "imu2", "imu3")  # redundant units
+REDUNDANT = {IMU: IMUS[1:], GPS: ("gps2",), MAGNETOMETER: ("magnetometer2",)}  # further units of an instrument
 IMU_SELECTION = "imu_selection"
 OPTICAL_FLOW, RANGEFINDER, AIRSPEED = "optical_flow", "rangefinder", "airspeed"
+EXTERNAL_VISION = "external_vision"
 TRAJECTORY, ACTUATORS, SETPOINT, STATUS, ESTIMATE = "trajectory", "actuators", "setpoint", "status", "estimate"
 ESTIMATE_COVARIANCE = "estimate_covariance"
 LIFT = "lift"
@@ -138,6 +140,16 @@ class OpticalFlowReading(NamedTuple):
     rate: tuple[float, float] = (0.0, 0.0)  # [rad/s] of the body about the same axes
     distance: float = 0.0  # [m] along the camera's axis
     variance: float = 0.0  # [(rad/s)^2] of the flow's white noise, per axis
+    valid: bool = False
+
+
+class ExternalVisionReading(NamedTuple):
+    """One pose of the body in the world, from cameras on board or in the room."""
+
+    position_world: Vec3 = ZERO  # [m]
+    attitude: Quaternion = NO_ROTATION  # body to world
+    position_variance: float = 0.0  # [m^2] per axis, of the white noise
+    attitude_variance: float = 0.0  # [rad^2]
     valid: bool = False
 
 

@@ -31,7 +31,7 @@ from lapwing.services.common.firmware.service import firmware_service
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.ports import AirspeedReading
 from lapwing.services.px4.exchange import MESSAGES, OUTPUTS, Px4Exchange, Readings, is_new
-from lapwing.services.px4.messages import ARMED, LOCK_STEP, rare_messages
+from lapwing.services.px4.messages import ARMED, LOCK_STEP, RC, rare_messages
 from lapwing.services.px4.modes import CONVENTIONS
 from lapwing.services.px4.resolve import NAME, Px4Config
 from lapwing.services.px4.sensor_frame import COMPONENT, NONE, SYSTEM, Sensors, frame, sensor_frame
@@ -60,7 +60,8 @@ class Px4Link(MavlinkLink):
     def __init__(self, config: FirmwareConfig, client: type[MissionClient] = MissionClient) -> None:
         """Store the configuration; see `MavlinkLink`."""
         super().__init__(config, client)
-        self._rare = rare_messages(config.own.datum.home)
+        flow = config.own.periods.get(ports.OPTICAL_FLOW, 0) * config.interval
+        self._rare = rare_messages(config.own.datum.home, flow, config.own.rc)
         self._sequence, self._rest, self._epoch, self._armed, self._silent, self._answers = np.zeros((6, 1), np.int64)
         self._port = 0  # of the firmware's end, 0 without a connection
         self._last_us = 0  # [us] of the last message
@@ -192,7 +193,7 @@ class Px4Link(MavlinkLink):
         if reason == MESSAGES:
             for port, message_of in self._rare.items():
                 if python_function(is_new)(self._own.periods.get(port, 0), self._config.period, tick) and (
-                    message := message_of(self._last_us, read(port))
+                    message := message_of(self._last_us, tick * self._config.interval if port == RC else read(port))
                 ):
                     self._codec.seq = self._next_sequence()
                     self._socket.append(message.pack(self._codec))

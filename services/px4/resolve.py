@@ -17,6 +17,7 @@ from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.common.schemas.communication_schema import ticks
 from lapwing.services.common.schemas.environment_schema import environment
 from lapwing.services.common.schemas.vehicle_schema import gravity, start_height, start_pose
+from lapwing.services.px4.messages import RC
 from lapwing.services.px4.schema import Px4
 
 __all__ = ["fleet", "resolve"]
@@ -28,11 +29,26 @@ DELAYS = {  # parameters [ms] of the delay of each sensor; of GPS also the name 
     ports.MAGNETOMETER: ("EKF2_MAG_DELAY",),
     ports.AIRSPEED: ("EKF2_ASP_DELAY",),
     ports.RANGEFINDER: ("EKF2_RNG_DELAY",),
+    ports.OPTICAL_FLOW: ("EKF2_OF_DELAY",),
+    ports.EXTERNAL_VISION: ("EKF2_EV_DELAY",),
 }
 DELAY_MAX = 200.0  # [ms] EKF2_DELAY_MAX of PX4, which no delay may exceed
 IMU_RATES = (100, 200, 250, 400)  # [Hz] values of IMU_INTEG_RATE
 TRUTH_PERIOD = 10  # steps between two messages of the true state, which only PX4's log uses
-OPTIONAL = (ports.AIRSPEED, ports.RANGEFINDER, ports.SONAR)
+OPTIONAL = (ports.AIRSPEED, ports.RANGEFINDER, ports.SONAR, ports.OPTICAL_FLOW, ports.EXTERNAL_VISION)
+RC_PERIOD = 0.02  # [s] between two messages of the radio
+RADIO = {
+    "COM_RC_IN_MODE": 0.0,
+    "RC_CHAN_CNT": 8.0,
+    "RC_MAP_ROLL": 1.0,
+    "RC_MAP_PITCH": 2.0,
+    "RC_MAP_THROTTLE": 3.0,
+    "RC_MAP_YAW": 4.0,
+}
+FUSED = {  # parameters that let PX4's filter use a sensor: flow; horizontal and vertical position, and yaw
+    ports.OPTICAL_FLOW: ("EKF2_OF_CTRL", 1.0),
+    ports.EXTERNAL_VISION: ("EKF2_EV_CTRL", 11.0),
+}
 _rotate_back = python_function(quaternion.rotate_back)
 _pressure = python_function(atmosphere.pressure)
 _height_above_home = python_function(geodesy.height_above_home)
@@ -46,7 +62,8 @@ class Px4Config(NamedTuple):
     force_body: Vec3  # [m/s^2] specific force at rest at the start
     field_body: Vec3  # [T] magnetic field there
     pressure: float  # [Pa] there
-    parameters: dict[str, float]  # PX4 parameters that describe the scene's sensors and battery
+    parameters: dict[str, float]  # PX4 parameters that describe the scene's sensors, radio and battery
+    rc: list[list[float]]  # rows of `Px4.rc`
 
 
 def resolve(scene: Scene) -> ServiceConfig | None:
@@ -63,7 +80,12 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         raise ConfigError("autopilot.firmware", f'"px4" needs {missing}; add them or choose another firmware')
     sensors = [*REQUIRED, *(name for name in OPTIONAL if name in tables)]
     periods = {name: ticks(scene, scene.lookup(f"sensors.{name}.rate"), name) for name in sensors}
+    for name, units in ports.REDUNDANT.items():
+        periods |= dict.fromkeys(units[: scene.lookup(f"sensors.{name}.instances") - 1], periods[name])
     periods[ports.TRUTH] = TRUTH_PERIOD * periods[ports.IMU]
+    received, rc = tuple(periods), scene[Px4].rc if scene.has(Px4) else []
+    if rc:
+        periods[RC] = periods[ports.IMU] * max(1, round(RC_PERIOD * scene.lookup(f"sensors.{ports.IMU}.rate")))
     here, (position, attitude) = environment(scene), start_pose(scene)
     own = Px4Config(
         Datum(here.home, start_height(scene), start_height(scene)),
@@ -71,9 +93,10 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         _rotate_back(attitude, (0.0, 0.0, gravity(scene))),
         _rotate_back(attitude, here.magnetic_field_world),
         _pressure(here.atmosphere, here.home.height + _height_above_home(here.home, position)),
-        sensor_parameters(scene),
+        sensor_parameters(scene) | (RADIO if rc else {}),
+        rc,
     )
-    return with_mission(scene, Px4, firmware_config(scene, tuple(periods), periods[ports.IMU], own))
+    return with_mission(scene, Px4, firmware_config(scene, received, periods[ports.IMU], own))
 
 
 def sensor_parameters(scene: Scene) -> dict[str, float]:
@@ -85,5 +108,6 @@ def sensor_parameters(scene: Scene) -> dict[str, float]:
     """
     delays = latencies(scene, DELAYS)
     result = {"SIM_BAT_ENABLE": 0.0, "COM_FLTT_LOW_ACT": 1.0, "EKF2_DELAY_MAX": max(DELAY_MAX, *delays.values())}
+    result |= dict(FUSED[name] for name in scene.tables("sensors") if name in FUSED)
     rate = scene.lookup(f"sensors.{ports.IMU}.rate")
     return result | delays | ({"IMU_INTEG_RATE": rate} if rate in IMU_RATES else {})

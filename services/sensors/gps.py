@@ -58,6 +58,7 @@ class Gps(NamedTuple):
     range_correlated_error: Annotated[float, Ge(0)] = 0.0  # [m] time-correlated error of the distance to a satellite
     fix_status: Annotated[int, Ge(0), Le(2)] = 0  # NavSatStatus: 0 plain, 1 SBAS, 2 with a ground station (RTK)
     rate: Annotated[float, Gt(0)] = 10.0  # [Hz] readings a second
+    instances: Annotated[int, Ge(1), Le(2)] = 1  # two: a redundant receiver, for a firmware; `faults` of the first
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
     antenna: Place | None = None  # [m] body; default: centre of mass
     rtk: Rtk | None = None  # single, float and fixed solutions; default: always `fix_status`

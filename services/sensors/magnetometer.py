@@ -32,6 +32,7 @@ class Magnetometer(NamedTuple):
     range_ut: Annotated[float, Gt(0)] = math.inf  # [uT] largest measurable field
     resolution_nt: Annotated[float, Ge(0)] = 0.0  # [nT] step of a reading
     rate: Annotated[float, Gt(0)] = 50.0  # [Hz] readings a second
+    instances: Annotated[int, Ge(1), Le(2)] = 1  # two: a redundant one, for a firmware; `faults` of the first
     latency_samples: Annotated[int, Ge(0), Lt(DEPTH)] = 0  # [samples] delay of a reading
     current_nt_per_a: tuple[Disturbance, Disturbance, Disturbance] = ZERO  # [nT/A] body, by the motors' total current
     faults: tuple[Fault, ...] | None = None  # compiled from the scene's schedule

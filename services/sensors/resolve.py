@@ -50,9 +50,10 @@ def resolve(scene: Scene) -> ServiceConfig | None:
         instruments.append(Instrument(p, key, surroundings))
         reading = trial_reading(name, table, p) if "module" in table else module_of(name, table).READING
         outputs.append(Port(name, reading, ticks(scene, p.rate, f"sensors.{name}.rate")))
-        for unit in ports.IMUS[1 : p.instances] if name == ports.IMU else ():
+        for unit in ports.REDUNDANT[name][: p.instances - 1] if name in ports.REDUNDANT else ():
             if unit in tables:
-                raise ConfigError(f"sensors.{unit}", "is the name of a redundant unit of sensors.imu", "another name")
+                message = f"is the name of a redundant unit of sensors.{name}"
+                raise ConfigError(f"sensors.{unit}", message, "another name")
             key = stream_key(scene[Run].seed, scene[Vehicle].name, unit)
             instruments.append(Instrument(p._replace(faults=None), key, surroundings))
             outputs.append(outputs[-1]._replace(name=unit))

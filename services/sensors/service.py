@@ -17,7 +17,6 @@ from lapwing.dynamics.vehicles.visible_body import VisibleBody
 from lapwing.kernels import DispatchTable, always_inline
 from lapwing.kernels.cell import Cell
 from lapwing.kernels.codegen import compile_source, dispatch, generic
-from lapwing.services.common import ports
 from lapwing.services.common.encoders import reading_encoder
 from lapwing.services.sensors.encoders import PORTS, topic_encoders
 from lapwing.services.sensors.sensor_inputs import ROTORS, OtherVehicle, Rotors, Truth
@@ -97,9 +96,8 @@ def create(config: RunConfig) -> Service:
         module, inputs = sys.modules[type(p.sensor).__module__], settings.inputs[: 1 + len(p.others)]
         blocks.append(Block(f"{NAME}.{port.name}", p, Cell(module.blank()), inputs, (port,), port.period))
         if port.name not in PORTS:
-            built_in = module.__package__ == __package__ and port.name not in ports.IMUS
-            encoders += (
-                module.topic_encoders(config.vehicle, port, p) if built_in else [reading_encoder(config.vehicle, port)]
-            )
+            own = module.__name__ == f"{__package__}.{port.name}" and hasattr(module, "topic_encoders")
+            generic_encoder = [] if own else [reading_encoder(config.vehicle, port)]
+            encoders += module.topic_encoders(config.vehicle, port, p) if own else generic_encoder
     sensors = {port.name: p.sensor for p, port in zip(instruments, settings.ports, strict=True)}
     return Service(NAME, blocks, encoders + topic_encoders(config, sensors))
