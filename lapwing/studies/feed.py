@@ -106,8 +106,8 @@ class Feed:
         """Return the sample of a port at a `time` [s]: one of a sensor if it is newer than a `period` [s]."""
         if port.name in SENSORS:
             return self.newest(port.name, time, period)
-        imu = _at(self._imu, time)
-        if port.name == ports.IMU:
+        imu = _at(self._flight.readings[port.name] if port.name in ports.IMUS[1:] else self._imu, time)
+        if port.name in ports.IMUS:
             return ports.ImuReading(imu[:3], imu[3:], valid=True)
         if port.name == ports.BATTERY:
             return port.example._replace(charge=1.0, voltage=_at(self._volts, time)[0])
@@ -149,6 +149,9 @@ def feed(flight: Recording, firmware: str, command: Sequence[str], overrides: Se
         raise ValueError(f"{flight.name}: no {', '.join(flight.missing)} to compare with; expected a flight with GPS")
     own, fixes = recorded(flight), flight.readings.get("gps")
     scene = load(f"{firmware}_quad", [*SCENES[firmware], f"autopilot.command={json.dumps(list(command))}", *overrides])
+    imus = 1 + sum(name in flight.readings for name in ports.IMUS[1:])
+    if firmware == "px4" and imus > 1:
+        scene = load(scene, [f"sensors.imu.instances={imus}"])
     begin = 0.0
     if fixes is not None and len(fixes.time) > 1:  # the log's origin is home
         begin = float(fixes.time[0]) + AHEAD

@@ -83,7 +83,10 @@ def read_dataflash_flight(path: Path, choices: Choices = Choices()) -> Recording
             offer(quantity, _estimates(messages, name, quantity, fields, ned, channels))
     offer("omega", every("IMU", *GYROSCOPE, frame="FRD"))
     offer("specific_force", every("IMU", *ACCELEROMETER, frame="FRD"))
-    offer("imu", every("IMU", *GYROSCOPE, *ACCELEROMETER, frame="FRD"))
+    units = every("IMU", *GYROSCOPE, *ACCELEROMETER, frame="FRD")
+    offer("imu", units)
+    for name, unit in zip(("imu2", "imu3"), units[1:], strict=False):
+        offer(name, [replace(unit, instance=None)])
     offer("battery", (*every("BAT", "Volt", "Curr"), *every("CURR", "Volt", "Curr")))
     offer("duty", [_duty(path, messages, parameters, channels)])
     for fix in every("GPS", "Lat", "Lng", "Alt", datum=SEA_LEVEL):

@@ -50,7 +50,10 @@ def direction(orientation: float) -> str:
 
 
 FLU = np.array([1.0, -1.0, -1.0])  # signs from FRD to FLU, and back
-BODY = {"omega": FLU, "specific_force": FLU, "mag": FLU, "imu": np.tile(FLU, 2), "optical_flow": [1, -1, 1, -1, 1]}
+BODY = {
+    "omega": FLU, "specific_force": FLU, "mag": FLU, "optical_flow": [1, -1, 1, -1, 1],
+    **dict.fromkeys(("imu", "imu2", "imu3"), np.tile(FLU, 2)),
+}  # fmt: skip
 
 
 def in_enu_flu(quantity: str, series: Series) -> Series:

@@ -13,7 +13,7 @@ import numpy as np
 
 from lapwing.flights.log_import.channels import Channels, to_recording
 from lapwing.flights.log_import.log_conventions import FIX, direction, out_of_range, parsing, shares
-from lapwing.flights.log_import.recording import ELLIPSOID, SEA_LEVEL, Recording, Series
+from lapwing.flights.log_import.recording import ELLIPSOID, LONGEST_GAP, SEA_LEVEL, Recording, Series
 from lapwing.flights.log_import.source_choice import Choices
 
 GAUSS = 1e-4  # [T]
@@ -213,6 +213,23 @@ def _optical_flow(topics: _Topics) -> list[Series]:
     return result
 
 
+def _further_imus(topics: _Topics) -> list[Series]:
+    """Return rates and specific force of the IMUs that `sensor_combined` does not have, if they are logged fast."""
+    selection = topics.first("sensor_selection", "accel_device_id")
+    gyroscopes = {s.instance: s for s in topics.every("sensor_gyro", "x", "y", "z", frame="FRD")}
+    forces = topics.every("sensor_accel", "x", "y", "z", "device_id", frame="FRD")
+    used = forces[:1] if selection is None else [selection]
+    result = []
+    for force in forces:
+        rates = gyroscopes.get(force.instance)
+        if rates is None or any(force.values[0, -1] in s.values[:, -1] for s in used):
+            continue
+        if len(rates.time) > 1 and np.median(np.diff(rates.time)) < LONGEST_GAP:
+            values = np.hstack([rates.values, force.at(rates.time)[:, :3]])
+            result.append(replace(rates, values=values, instance=None))
+    return result
+
+
 def _status(topics: _Topics) -> list[Series]:
     """Return armed, landed, failsafe and navigation state at all times at which one of them is logged."""
     state = topics.first("vehicle_status", "arming_state", "failsafe", "nav_state")
@@ -242,6 +259,8 @@ def _offer_readings(channels: Channels, topics: _Topics) -> None:
 
     raw = [f"{name}[{k}]" for name in ("gyro_rad", "accelerometer_m_s2") for k in range(3)]
     offer("imu", every("sensor_combined", *raw, frame="FRD"))
+    for name, unit in zip(("imu2", "imu3"), _further_imus(topics), strict=False):
+        offer(name, [unit])
     for topic in ("vehicle_gps_position", "sensor_gps"):  # degrees and metres were integers until PX4 1.14
         for height, datum in (("ellipsoid", ELLIPSOID), ("msl", SEA_LEVEL)):
             labels = {"quantity": "gps", "datum": datum}

@@ -192,7 +192,7 @@ def _readings(flight: Recording) -> list[Iterator[tuple[int, Topic, Any]]]:
             if time >= 0.0 and np.isfinite(values).all():
                 yield (time_ns := round(float(time) * 1e9)), topic, message(_header(time_ns), values.tolist())
 
-    return [messages(name, series) for name, series in flight.readings.items()]
+    return [messages(name, series) for name, series in flight.readings.items() if name in SENSORS]
 
 
 def _setpoint(header: Header, v: Sequence[float]) -> Setpoint:

@@ -4,9 +4,22 @@ import re
 import shlex
 
 import pytest
-from flight_writers import write_bin
+from flight_writers import ned, write_bin, write_ulog_topics
 
 from tests.services.firmware_links import lapwing, scripted
+
+
+def write_ulog_with_two_imus(path, flight):
+    """Write a ULog file whose `sensor_combined` is the second of two IMUs."""
+    v = ned(flight)
+    fields, code, makers = "uint32_t device_id;float x;float y;float z;", "I3f", {"gyro": "omega", "accel": "force"}
+    topics = [
+        (f"sensor_{kind}", number, fields, code, lambda k, n=number, name=name: (100 + n, *v[name][k]))
+        for kind, name in makers.items()
+        for number in (0, 1)
+    ]
+    selection = ("sensor_selection", 0, "uint32_t accel_device_id;", "I", lambda k: (101,))
+    return write_ulog_topics(path, flight, [*topics, selection])
 
 
 def numbers(line):
@@ -30,6 +43,15 @@ def test_estimates_are_compared_with_log_and_with_each_other(firmware, flight, t
     assert position < 0.05
     assert numbers(differences["build 1 and build 2"]) == [0.0] * 6
     assert numbers(differences["build 1 and build 3"])[2:4] == [0.5, 0.5]
+
+
+@pytest.mark.parametrize("writer", [write_bin, write_ulog_with_two_imus])
+def test_each_imu_of_the_log_is_played(writer, flight, tmp_path):
+    path = writer(tmp_path / ("f.bin" if writer is write_bin else "f.ulg"), flight)
+    command = shlex.join(scripted("px4", "--estimate", 0, "--received", tmp_path / "received.txt"))
+    lapwing("feed", path or tmp_path / "f.bin", "--firmware", "px4", f"--command={command}", "--skip", "0.5")
+    received = (tmp_path / "received.txt").read_text().splitlines()
+    assert [line for line in received if line.startswith("HIL_SENSOR")] == ["HIL_SENSOR 1"]
 
 
 def test_what_is_missing_is_named(flight, tmp_path):

@@ -43,11 +43,11 @@ class Px4Peer:
         self._socket.sendall(data)
 
     def receive(self, kind="HIL_SENSOR"):
-        """Return the next message of a kind; None when the simulator has closed the connection."""
+        """Return the next message of a kind and instance 0; None when the simulator has closed the connection."""
         while True:
             while self._waiting:
                 message = self._waiting.pop(0)
-                if message.get_type() == kind:
+                if message.get_type() == kind and getattr(message, "id", 0) == 0:
                     return message
                 self.skipped.append(message)
             data = b""

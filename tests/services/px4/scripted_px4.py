@@ -4,7 +4,8 @@ Started as `python scripted_px4.py -i INSTANCE`. With `--silent FILE` it connect
 answers; with `--stall` it stops answering in flight; with `--stop` it is halted
 there for 3 s. With `--starts FILE` it appends its instance and process id to a file. With `--cores FILE` it writes, in
 flight, the cores of its thread and of each thread of its parent process. With `--estimate BIAS` it sends the true state
-as its estimate, with a bias of the velocity north [m/s].
+as its estimate, with a bias of the velocity north [m/s]. With `--received FILE` it writes a line with kind and instance
+of each message other than HIL_SENSOR 0.
 """
 
 import argparse
@@ -104,6 +105,7 @@ def main():
     parser.add_argument("--starts", type=Path)
     parser.add_argument("--cores", type=Path)
     parser.add_argument("--estimate", type=float)
+    parser.add_argument("--received", type=Path)
     options = parser.parse_args()
     if options.starts:
         with options.starts.open("a") as file:
@@ -114,9 +116,13 @@ def main():
         peer.receive("NEVER")
     message = peer.start()
     ground = height = rate = 0.0
-    armed_at = None
+    armed_at, received = None, set()
     while message is not None:
         for other in peer.skipped:
+            name = f"{other.get_type()} {getattr(other, 'id', 0)}"
+            if options.received and name not in received:
+                received.add(name)
+                options.received.write_text("\n".join(sorted(received)))
             if other.get_type() == "HIL_GPS":
                 ground = ground or other.alt * 1e-3
                 height, rate = other.alt * 1e-3 - ground, -other.vd * 1e-2

@@ -14,10 +14,14 @@ from lapwing.services.common.ports import (
     GPS_SBAS,
     GPS_SINGLE,
     DistanceReading,
+    ExternalVisionReading,
     GpsReading,
+    ImuReading,
+    MagnetometerReading,
+    OpticalFlowReading,
     TrueState,
 )
-from lapwing.services.px4.messages import distance_message, gps_message, truth_message
+from lapwing.services.px4.messages import RC, distance_message, gps_message, rare_messages, truth_message
 from lapwing.services.px4.sensor_frame import Sensors, frame, pressure_altitude, read_controls, sensor_frame
 
 
@@ -48,6 +52,60 @@ def test_true_state_is_that_of_the_plant():
     assert (result.vx, result.vy, result.vz) == (200, 100, -300)
     assert (result.xacc, result.yacc, result.zacc) == (1000, 0, 0)
     assert [result.rollspeed, result.pitchspeed, result.yawspeed] == pytest.approx([0.1, -0.2, -0.3])
+
+
+def received(port, reading, flow_interval=0.02, rc=()):
+    """Return the message of a port at 4 ms as PX4 reads it, None if there is none."""
+    message = rare_messages(STANDARD.home, flow_interval, rc)[port](4000, reading)
+    return message and mavlink.MAVLink(None).parse_buffer(packed(message))[0]
+
+
+def test_flow_of_flight_forwards_and_to_the_right_has_the_signs_of_mavlink():
+    """Motion along FRD y gives a negative flow about x, along x a positive one about y; a turn its rate."""
+    forward, right, height = 2.0, 0.5, 4.0
+    moving = OpticalFlowReading((-right / height, -forward / height), distance=height, valid=True)
+    result = received("optical_flow", moving)
+    assert result.integration_time_us == 20_000
+    assert (result.integrated_x, result.integrated_y) == pytest.approx((-0.02 * 0.125, 0.02 * 0.5))
+    assert (result.integrated_xgyro, result.integrated_ygyro) == (0.0, 0.0)
+    assert (result.distance, result.quality) == (4.0, 255)
+    turning = received("optical_flow", OpticalFlowReading((0.3, 0.2), (0.3, 0.2), 4.0, valid=True))
+    assert (turning.integrated_x, turning.integrated_y) == pytest.approx((0.006, -0.004))
+    assert (turning.integrated_xgyro, turning.integrated_ygyro) == pytest.approx((0.006, -0.004))
+    assert received("optical_flow", OpticalFlowReading()).quality == 0
+
+
+def test_redundant_units_have_their_instances_and_axes():
+    imu = received("imu3", ImuReading((0.1, 0.2, 0.3), (1.0, 2.0, 9.8), valid=True))
+    assert (imu.id, imu.fields_updated) == (2, 0x3F)
+    assert (imu.xacc, imu.yacc, imu.zacc) == pytest.approx((1.0, -2.0, -9.8))
+    assert (imu.xgyro, imu.ygyro, imu.zgyro) == pytest.approx((0.1, -0.2, -0.3))
+    field = received("magnetometer2", MagnetometerReading((2e-5, 1e-5, -4e-5), valid=True))
+    assert (field.id, field.fields_updated) == (1, 0x1C0)
+    assert (field.xmag, field.ymag, field.zmag) == pytest.approx((0.2, -0.1, 0.4))
+    fix = GpsReading(40.0, 14.0, 100.0, (1.0,) * 3, (1.0, 2.0, 3.0), valid=True)
+    assert (received("gps", fix).id, received("gps2", fix).id) == (0, 1)
+    assert received("imu2", ImuReading()) is received("magnetometer2", MagnetometerReading()) is None
+
+
+def test_external_vision_is_a_pose_in_ned():
+    """Nose to the north: yaw 0 in NED, 90 degrees from east in ENU."""
+    north = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))
+    result = received("external_vision", ExternalVisionReading((1.0, 2.0, 3.0), north, 1e-4, 1e-3, True))
+    assert (result.x, result.y, result.z) == (2.0, 1.0, -3.0)
+    assert result.q == pytest.approx([1.0, 0.0, 0.0, 0.0], abs=1e-7)
+    assert (result.frame_id, result.estimator_type) == (mavlink.MAV_FRAME_LOCAL_NED, mavlink.MAV_ESTIMATOR_TYPE_VISION)
+    assert [result.pose_covariance[k] for k in (0, 6, 11, 15, 18, 20)] == pytest.approx([1e-4] * 3 + [1e-3] * 3)
+    assert math.isnan(result.vx)
+    assert received("external_vision", ExternalVisionReading()) is None
+
+
+def test_radio_holds_each_row_until_the_next():
+    rows = [[1.0, 1500, 1200], [2.0, 1500, 1800]]
+    assert received(RC, 0.5, rc=rows) is None
+    first, second = received(RC, 1.5, rc=rows), received(RC, 2.0, rc=rows)
+    assert (first.chancount, first.chan1_raw, first.chan2_raw, second.chan2_raw) == (2, 1500, 1200, 1800)
+    assert first.chan3_raw == 0xFFFF
 
 
 def test_level_at_rest_accelerates_up_in_frd():

@@ -22,7 +22,17 @@ from lapwing.dynamics.lie.quaternion import (
 from lapwing.dynamics.noise import stream_key
 from lapwing.dynamics.terrain import LEVEL, relief
 from lapwing.dynamics.vector import ZERO
-from lapwing.services.sensors import airspeed, barometer, gps, imu, magnetometer, optical_flow, rangefinder, sonar
+from lapwing.services.sensors import (
+    airspeed,
+    barometer,
+    external_vision,
+    gps,
+    imu,
+    magnetometer,
+    optical_flow,
+    rangefinder,
+    sonar,
+)
 from lapwing.services.sensors.schema import parameters
 from lapwing.services.sensors.sensor_inputs import Rotors, Truth
 
@@ -60,6 +70,24 @@ def test_imu_measures_in_body_frame():
         imu, imu.Imu(), truth(attitude=from_roll_pitch_yaw(0.0, 0.0, math.pi / 2), acceleration=(0.0, 2.0, 0.0))
     )
     np.testing.assert_allclose(ahead.specific_force_body, (2.0, 0.0, G), atol=1e-12)
+
+
+def test_external_vision_sees_the_pose():
+    """Ideal: the true pose, also with the other sign of its quaternion, two samples late; noise of the stated size."""
+    poses = [truth((k, 2.0, 3.0), from_roll_pitch_yaw(0.1, -0.2, 3.0 + 0.2 * k)) for k in range(4)]
+    late = read(external_vision, external_vision.ExternalVision(latency_samples=2), *poses)
+    assert late.position_world == (1.0, 2.0, 3.0)
+    turn = multiply(conjugate(late.attitude), poses[1].attitude)
+    np.testing.assert_allclose(np.abs(turn), (1.0, 0.0, 0.0, 0.0), atol=1e-12)
+    noisy = external_vision.ExternalVision(0.01, 0.1, rate=50.0)
+    s, readings = external_vision.initial(noisy, KEY, truth()), []
+    for tick in range(2000):
+        s, reading = external_vision.sample(noisy, s, KEY, tick, truth())
+        readings.append((*reading.position_world, *log(reading.attitude)))
+    deviation = np.std(readings, axis=0)
+    np.testing.assert_allclose(deviation[:3], 0.05, rtol=0.06)  # 0.01 m/sqrt(Hz) sqrt(50 Hz / 2)
+    np.testing.assert_allclose(deviation[3:], math.radians(0.5), rtol=0.06)
+    assert reading.position_variance == pytest.approx(0.05**2)
 
 
 def test_imu_saturates_and_rounds():
