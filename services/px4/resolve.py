@@ -1,5 +1,6 @@
 """Resolution of a scene that PX4 flies."""
 
+from collections.abc import Sequence
 from typing import NamedTuple
 
 from lapwing.cosim.config.run_config import ServiceConfig
@@ -63,7 +64,7 @@ class Px4Config(NamedTuple):
     field_body: Vec3  # [T] magnetic field there
     pressure: float  # [Pa] there
     parameters: dict[str, float]  # PX4 parameters that describe the scene's sensors, radio and battery
-    rc: list[list[float]]  # rows of `Px4.rc`
+    rc: Sequence[Sequence[float]] = ()  # rows of `Px4.rc`
 
 
 def resolve(scene: Scene) -> ServiceConfig | None:

@@ -15,6 +15,11 @@ from pymavlink.dialects.v20 import all as mavlink
 STARTING = 15  # messages before the first answer: 60 ms at 250 Hz
 
 
+def instance(message):
+    """Return the number of the sensor in a message, 0 for a kind without numbers (its `id` is that of the kind)."""
+    return message.id if "id" in message.fieldnames else 0
+
+
 class Px4Peer:
     """Scripted PX4."""
 
@@ -47,7 +52,7 @@ class Px4Peer:
         while True:
             while self._waiting:
                 message = self._waiting.pop(0)
-                if message.get_type() == kind and getattr(message, "id", 0) == 0:
+                if message.get_type() == kind and instance(message) == 0:
                     return message
                 self.skipped.append(message)
             data = b""

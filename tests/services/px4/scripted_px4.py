@@ -19,7 +19,7 @@ sys.path.insert(0, str(Path(__file__).parents[3]))
 
 from pymavlink.dialects.v20 import all as mavlink
 
-from tests.services.px4.peer import Px4Peer
+from tests.services.px4.peer import Px4Peer, instance
 from tests.services.stopped import stop_for
 
 HOVER, HEIGHT = 0.62, 2.0  # duty in hover; [m]
@@ -119,7 +119,7 @@ def main():
     armed_at, received = None, set()
     while message is not None:
         for other in peer.skipped:
-            name = f"{other.get_type()} {getattr(other, 'id', 0)}"
+            name = f"{other.get_type()} {instance(other)}"
             if options.received and name not in received:
                 received.add(name)
                 options.received.write_text("\n".join(sorted(received)))

@@ -119,18 +119,46 @@ def test_invalid_mission_is_rejected(tmp_path):
     assert "px4.mission" in lapwing("check", tmp_path / "scene.toml", code=2).stderr
 
 
+FURTHER = [
+    "sensors.imu.instances=3", "sensors.gps.instances=2", "sensors.magnetometer.instances=2",
+    "sensors.optical_flow.preset=pmw3901", "sensors.rangefinder.preset=lidar_lite_v3",
+    "sensors.external_vision.preset=motion_capture", "px4.rc=[[0.0, 1500, 1500, 1000, 1500]]",
+]  # fmt: skip
+KINDS = ["HIL_GPS 1", "HIL_OPTICAL_FLOW 0", "HIL_SENSOR 1", "HIL_SENSOR 2", "ODOMETRY 0", "RC_CHANNELS 0"]
+
+
+def test_further_sensors_and_radio_reach_the_firmware(tmp_path):
+    command = scripted("px4", "--received", tmp_path / "received.txt")
+    sets = [text for pair in FURTHER for text in ("--set", pair)]
+    result = fly("px4", command, "--log", tmp_path / "flight.mcap", *sets)
+    assert "Landed" in result.stdout
+    assert set(KINDS) <= set((tmp_path / "received.txt").read_text().splitlines())
+
+
+def test_radio_rows_with_equal_times_are_rejected():
+    done = lapwing("check", "px4_quad", "--set", "px4.rc=[[1.0, 1500], [1.0, 1600]]", code=2)
+    assert "px4.rc: expected rows with increasing times" in done.stderr
+
+
+def test_own_autopilot_rejects_a_second_receiver():
+    done = lapwing("check", "delivery_full", "--set", "sensors.gps.instances=2", code=2)
+    assert "sensors.gps.instances: Lapwing's autopilot uses one" in done.stderr
+
+
 @pytest.mark.long
+@pytest.mark.parametrize("further", [[], FURTHER], ids=["plain", "further sensors"])
 @pytest.mark.skipif("PX4" not in os.environ, reason="PX4 names no px4 program")
-def test_px4_flies_its_square(tmp_path):
+def test_px4_flies_its_square(tmp_path, further):
     log, binary = tmp_path / "flight.mcap", Path(os.environ["PX4"]).resolve()
+    sets = [text for pair in further for text in ("--set", pair)]
     command = [str(binary), "-d", str(binary.parents[1] / "etc")]
     environment = 'autopilot.environment={PX4_SIM_MODEL = "none_iris"}'
     links = "autopilot.instance=8"  # missions go to instances 0 to 9 only
-    result = fly("px4", command, "--log", log, "--set", environment, "--set", links)
+    result = fly("px4", command, "--log", log, "--set", environment, "--set", links, *sets)
     assert "Landed" in result.stdout
     with LogReader(log) as reader:
         assert "skew 0 ms" in reader.metadata["firmware"]
-    assert abs(lag_of_estimate(tmp_path / "flight.px4.ulg", log)) < 0.02
+    assert abs(lag_of_estimate(tmp_path / "flight.px4.ulg", log)) < (0.03 if further else 0.02)  # steps of 0.02 s
 
 
 def lag_of_estimate(ulog, log):

@@ -11,6 +11,7 @@ def test_sensors_of_folder_are_discovered():
         "airspeed",
         "barometer",
         "depth_camera",
+        "external_vision",
         "gps",
         "imu",
         "lidar",
@@ -75,7 +76,7 @@ def test_limit_may_be_infinite():
 
 
 def test_unknown_sensor_lists_choices():
-    with pytest.raises(ValueError, match="airspeed, barometer, depth_camera, gps, imu, lidar, magnetometer"):
+    with pytest.raises(ValueError, match="airspeed, barometer, depth_camera, external_vision, gps, imu"):
         schema.parameters("radar", {}, 0.004)
 
 
