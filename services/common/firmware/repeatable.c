@@ -569,7 +569,7 @@ __attribute__((constructor)) static void begin(void) {
     unsigned core;
     cpu_set_t one;
     CPU_ZERO(&one);
-    if (read_ns && !syscall(SYS_getcpu, &core, NULL, NULL)) { /* messages of two sockets arrive in the order of sending */
+    if (!syscall(SYS_getcpu, &core, NULL, NULL)) { /* messages of two sockets arrive in the order of sending */
         CPU_SET(core, &one);
         sched_setaffinity(0, sizeof one, &one);
     }
