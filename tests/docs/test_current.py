@@ -12,11 +12,12 @@ DOCS = Path(__file__).parents[2] / "docs"
 
 
 def test_python_page_lists_public_names():
-    listed = {line.rpartition(".")[2] for line in (DOCS / "reference/python.md").read_text().splitlines()}
+    listed = set(re.findall(r"^### (\w+)$", (DOCS / "reference/python.md").read_text(), re.MULTILINE))
     assert set(lapwing.__all__) <= listed
 
 
 def test_reference_pages_are_current():
+    pytest.importorskip("gymnasium")  # whose environments the Python page describes
     pages = runpy.run_path(str(DOCS / "site/reference.py"))["pages"]()
     written = {name: (DOCS / "reference" / name).read_text() for name in pages if (DOCS / "reference" / name).exists()}
     assert written == pages, "python docs/site/reference.py"
