@@ -22,6 +22,10 @@ def test_package_data_covers_data_files():
     assert {path.suffix for path in data if not path.is_relative_to(SHIPPED)} <= endings
 
 
+def test_type_checkers_read_annotations():
+    assert (ROOT / "lapwing/py.typed").is_file()
+
+
 def test_package_data_covers_shipped_kernels():
     assert f"{SHIPPED.relative_to(ROOT / 'lapwing')}/**/*" in SETUPTOOLS["package-data"]["lapwing"]
 

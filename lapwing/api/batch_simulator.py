@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from lapwing.api import batch_members
+from lapwing.api.short_errors import short_errors
 from lapwing.cosim.scene import Overrides, Scene
 from lapwing.dynamics import simd_batch
 from lapwing.dynamics.effects._types import Motion
@@ -57,6 +58,7 @@ class BatchSimulator:
     With motor voltages, every member is bit-for-bit identical to the plant of `lapwing.fly`.
     """
 
+    @short_errors
     def __init__(
         self,
         scene: Scene | str | Path,

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from lapwing.api.flight import Flight
+from lapwing.api.short_errors import short_errors
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.scene import Overrides, Scene, SceneError
 from lapwing.runs.observer import notify_on_compile
@@ -21,6 +22,7 @@ from lapwing.studies.campaign.distributions import Distribution
 from lapwing.studies.campaign.plan import plan
 
 
+@short_errors
 def load_scene(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
     """Read a scene and the files that it names, apply overrides, and validate it.
 
@@ -35,6 +37,7 @@ def load_scene(scene: Scene | str | Path, overrides: Overrides = ()) -> Scene:
     return scene_resolver.load(scene, overrides)
 
 
+@short_errors
 def fly(
     scene: Scene | str | Path,
     overrides: Overrides = (),
@@ -54,12 +57,12 @@ def fly(
         overrides: see `load_scene`.
         seed: seed of all random numbers, 0 to 2^63 - 1; None for that of the scene.
         controller: replaces the controller of the scene: a class, an object (copied at each take-off), or
-            "module:Class". It has a `rate` [Hz] and `step(time, estimate, setpoint)`; see
-            `lapwing.services.common.controller_api`. A class in a separate module becomes part of the run
+            "module:Class". It has a `rate` [Hz] and `step(time, estimate, setpoint)`; `lapwing new controller` writes
+            an example. A class in a separate module becomes part of the run
             configuration, so that `lapwing resimulate` can repeat a saved log; a class of a script or prompt does not.
         controller_options: arguments of the constructor by name: numbers, texts, lists of numbers.
-        estimator: replaces the estimator of the scene; it has a `rate` [Hz] and `step(time, readings)`; see
-            `lapwing.services.autopilot.custom.estimator_api`.
+        estimator: replaces the estimator of the scene; it has a `rate` [Hz] and `step(time, readings)`;
+            `lapwing new estimator` writes an example.
         estimator_options: arguments of the constructor by name.
 
     Raises:
@@ -87,6 +90,7 @@ def read_log(log: str | Path) -> Flight:
     return Flight.read(log)
 
 
+@short_errors
 def campaign(
     scene: Scene | str | Path,
     seeds: Iterable[int] = range(1, 101),
@@ -108,7 +112,7 @@ def campaign(
 
     Returns:
         The flight of each run, in order. With the seeds 1 to n and `seed` = 1, they equal those of
-        `lapwing campaign --runs n`.
+        `lapwing campaign --runs n`. `flight.config.resolved["vehicle"]["mass"]` is the drawn value of "vehicle.mass".
 
     Raises:
         SceneError: the scene is invalid, or a drawn value does not fit it.
@@ -123,7 +127,10 @@ def campaign(
     seeds = list(seeds)
     if not seeds:
         raise SceneError("seeds", "got none", "at least one")
-    campaign_plan = plan(base.name, (), len(seeds), seed, vary, design=design)
+    try:
+        campaign_plan = plan(base.name, (), len(seeds), seed, vary, design=design)
+    except ValueError as error:
+        raise ValueError(str(error).removeprefix("--")) from None  # an argument here, an option of the command
     fixed = None if campaign_plan.keys else resolve(base)
 
     def config(run: int) -> RunConfig:

@@ -7,6 +7,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from lapwing.api.short_errors import short_errors
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import BlockDiagram, ExternalBlock, Service
 from lapwing.cosim.diagram.tick_schedule import LATCHED, Port
@@ -60,6 +61,7 @@ class Simulator:
     autopilot of the scene.
     """
 
+    @short_errors
     def __init__(self, scene: Scene | str | Path, overrides: Overrides = (), seed: int | None = None):
         """Create a vehicle at rest at its initial position.
 

@@ -46,7 +46,7 @@ class Event(NamedTuple):
     """An event of a flight."""
 
     time: float  # [s]
-    kind: str  # one of lapwing.services.common.event_kinds.KINDS
+    kind: str  # "fault", "failsafe", "crash", "mode", ...; all: lapwing.services.common.event_kinds.KINDS
     text: str
 
     @property

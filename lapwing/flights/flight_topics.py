@@ -29,7 +29,7 @@ class FlightTopics:
 
     @property
     def config(self) -> RunConfig:
-        """Run configuration of the flight.
+        """Run configuration; `config.resolved["vehicle"]["mass"]` is a value of the scene that has flown.
 
         Raises:
             ValueError: the log has no run configuration, or one that this version cannot read.
@@ -103,7 +103,12 @@ class FlightTopics:
         return self.topic(topic).times
 
     def column(self, topic: str, field: str) -> np.ndarray:
-        """Return a field of a topic by its dotted name, "pose.position" or "thrust", shape (n,) or (n, k)."""
+        """Return a field of a topic by its dotted name, "pose.position" or "thrust", shape (n,) or (n, k).
+
+        Raises:
+            ValueError: the topic does not exist.
+            KeyError: not all messages have this field.
+        """
         return self.topic(topic)[field]
 
     def to_dataframe(self, topic: str = "ground_truth") -> Any:

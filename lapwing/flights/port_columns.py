@@ -43,7 +43,7 @@ class PortColumns(Mapping[str, Any]):
 
     def __init__(self, diagram: BlockDiagram, encoder: TopicEncoder):
         """Create from a topic of a finished block diagram with the full history of its port."""
-        self._diagram, self._encoder = diagram, encoder
+        self._diagram, self._encoder, self.message = diagram, encoder, encoder.topic.message
         period = diagram.ports[encoder.port].period
         rows = diagram.history(encoder.port, period)
         self.ticks = encoder.message_ticks(0, diagram.tick, lambda ticks: rows[ticks // period])
@@ -59,7 +59,7 @@ class PortColumns(Mapping[str, Any]):
     def _names(self) -> dict[str, None]:
         """Names of the fields that all messages have, whatever their texts."""
         keys = _distinct(self._texts) if self._texts else [()]
-        shapes = [_shapes(self._encoder.topic.message, self._encoder.sample(*key).encode()) for key in keys]
+        shapes = [_shapes(self.message, self._encoder.sample(*key).encode()) for key in keys]
         return dict.fromkeys(name for name in shapes[0] if all(name in others for others in shapes))
 
     @cached_property
@@ -68,7 +68,7 @@ class PortColumns(Mapping[str, Any]):
         port = self._diagram.ports[self._encoder.port]
         batches = list(encode(self._encoder, port, self._diagram.config, self.ticks, self._rows))
         parts = [(np.searchsorted(self.ticks, batch.ticks), batch.payloads) for batch in batches]
-        return history_of_batches(self._encoder.topic.message, parts)
+        return history_of_batches(self.message, parts)
 
     def payloads(self) -> list[bytes]:
         """Return the CDR of the messages in order."""

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from lapwing.flights import tracking
+from lapwing.messages.types import DEFINITIONS
 
 
 class TopicView:
@@ -106,6 +107,12 @@ class TopicView:
 
     def __dir__(self) -> list[str]:
         return [*super().__dir__(), *(name for name in self._columns if "." not in name)]
+
+    def __repr__(self) -> str:
+        """Return the number of the messages and their definition, whose comments state frames and units."""
+        if message := getattr(self._columns, "message", None):
+            return f"{len(self)} {message.type_name}\n{DEFINITIONS[message.type_name].text.strip()}"
+        return f"{len(self)} messages: {', '.join(self.fields)}"
 
     def __len__(self) -> int:
         return len(self._times_ns)

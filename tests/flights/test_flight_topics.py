@@ -24,6 +24,12 @@ def in_memory():
     return fly(resolve(load("hover", ["run.duration=2.0"])))
 
 
+def test_text_of_topic_states_frames_and_units(in_memory, tmp_path):
+    assert "angular_velocity   # body frame (FLU) [rad/s]" in repr(in_memory.truth)
+    log = lapwing.fly("hover", {"run.duration": 0.5}).save(tmp_path / "flight.mcap")
+    assert repr(lapwing.read_log(log).truth).startswith("126 lapwing_msgs/msg/VehicleState\n")
+
+
 def test_fields_are_attributes(in_memory):
     truth, setpoint = in_memory.truth, in_memory.setpoint
     n = TICKS + 1

@@ -1,6 +1,7 @@
 """`import lapwing`: passed controllers and estimators, loaded scenes, campaigns, and errors of one line."""
 
 import sys
+import traceback
 from typing import NamedTuple
 
 import numpy as np
@@ -164,6 +165,32 @@ def test_invalid_arguments_are_scene_errors_of_one_line(wrong, text):
         wrong()
     assert text in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("function", [lapwing.fly, lapwing.load_scene, lapwing.campaign, lapwing.Simulator])
+def test_traceback_of_scene_error_ends_at_call(function):
+    with pytest.raises(lapwing.SceneError) as caught:
+        function("hoverr")
+    assert [entry.name for entry in caught.traceback] == ["test_traceback_of_scene_error_ends_at_call", "call"]
+    assert traceback.format_exception_only(caught.value)[0].startswith("lapwing.SceneError: unknown scene 'hoverr'")
+
+
+def test_campaign_names_its_argument():
+    with pytest.raises(ValueError, match=r"^design halton: expected one of random"):
+        lapwing.campaign("hover", [1], design="halton")
+
+
+def test_constructor_without_arguments_is_error_of_controller():
+    expected = (
+        r"^override autopilot.controller: TypeError: Bare\(\) takes no arguments; expected a constructor with one"
+    )
+    with pytest.raises(lapwing.SceneError, match=expected):
+        lapwing.fly("hover", controller=type("Bare", (), {"rate": 250.0, "step": Faulty.step}))
+
+
+def test_drawn_value_is_in_configuration_of_its_flight():
+    (flight,) = lapwing.campaign("hover", [1], {"vehicle.mass": lapwing.choice(10.2)}, {"run.duration": 0.1})
+    assert flight.config.resolved["vehicle"]["mass"] == 10.2
 
 
 @pytest.mark.parametrize("wrong", [lambda: lapwing.normal(1.0, -1.0), lapwing.choice, lambda: lapwing.uniform(2, 1)])

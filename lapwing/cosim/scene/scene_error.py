@@ -26,6 +26,8 @@ NOWHERE = KeyOrigin()
 class SceneError(ConfigError):
     """Invalid scene; `str` is one line for the user."""
 
+    __module__ = "lapwing"  # the name in tracebacks is that to catch
+
     def __init__(self, key: str, message: str, expected: str = "", source: KeyOrigin = NOWHERE):
         super().__init__(key, message, expected)
         self.args = (key, message, expected, source)

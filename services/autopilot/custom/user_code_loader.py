@@ -130,7 +130,7 @@ def constructor(
         try:
             return cls(vehicle, **options) if cls else copy.deepcopy(user_code)
         except FAULTS as error:
-            raise _constructor_error(key, error, module) from error
+            raise _constructor_error(key, error, module, options) from error
 
     return construct
 
@@ -142,14 +142,16 @@ def compile_controller(
     try:
         p, s = user_code(vehicle, **options)
     except FAULTS as error:
-        raise _constructor_error(CONTROLLER, error, module) from error
+        raise _constructor_error(CONTROLLER, error, module, options) from error
     if type(p).__module__ != module.__name__ or not isinstance(p, tuple) or not hasattr(module, "step"):
         expected = "a NamedTuple of the same module, which also defines `step`"
         raise ConfigError(CONTROLLER, f"{user_code.__name__} returned {type(p).__name__} parameters", expected)
     return p, s
 
 
-def _constructor_error(key: str, error: BaseException, module: ModuleType) -> ConfigError:
-    """Return the error of a constructor, under the options' key if an argument is wrong."""
-    options = isinstance(error, TypeError) and "argument" in str(error)
-    return ConfigError(f"{key}_options" if options else key, blame(error, module))
+def _constructor_error(key: str, error: BaseException, module: ModuleType, options: Mapping[str, Any]) -> ConfigError:
+    """Return the error of a constructor, under the options' key if one of them may be wrong."""
+    if not (isinstance(error, TypeError) and "argument" in str(error)):
+        return ConfigError(key, blame(error, module))
+    expected = "" if options else "a constructor with one argument, the vehicle's model"
+    return ConfigError(f"{key}_options" if options else key, blame(error, module), expected)
