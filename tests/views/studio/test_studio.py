@@ -194,12 +194,15 @@ def test_cards_of_flights_have_picture_and_outcome(studio, folder, flown):
     assert logs(folder)[0] not in studio.page("?q=hover+crashed")
 
 
-def test_cards_that_load_at_the_same_time_are_all_found(start, tmp_path):
+def test_finished_logs_are_found_by_cards_that_load_at_the_same_time(start, tmp_path):
     logs = tmp_path / "recordings"
     logs.mkdir()
     for number in range(4):
-        (logs / f"{number}.mcap").touch()
+        (logs / f"{number}.mcap").write_text("no log")
+    (logs / "starts.mcap").touch()
     studio = start(tmp_path)
+    assert "0.mcap" in (home := studio.page(""))
+    assert "starts.mcap" not in home
     host = studio.origin.removeprefix("http://")
     for _ in range(20):
         clients = [HTTPConnection(host, timeout=300.0) for _ in range(40)]
