@@ -3,11 +3,14 @@
 import fcntl
 import os
 import stat
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
 from errno import EWOULDBLOCK
 from io import FileIO
 from pathlib import Path
+
+ATTEMPTS, PAUSE = 10, 0.02  # [s] `is_locked` of another process holds the lock for a moment
 
 
 @contextmanager
@@ -66,21 +69,29 @@ def lock_descriptor(descriptor: int, path: Path, shared: bool = False) -> None:
     mode = os.fstat(descriptor).st_mode
     if not (stat.S_ISREG(mode) or stat.S_ISDIR(mode)):
         return
-    try:
-        fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
-    except OSError as error:
-        if error.errno == EWOULDBLOCK:
-            raise ValueError(f"{path}: another process is writing it; choose another name, or wait for it") from None
+    for _ in range(ATTEMPTS):
+        try:
+            fcntl.flock(descriptor, (fcntl.LOCK_SH if shared else fcntl.LOCK_EX) | fcntl.LOCK_NB)
+            return
+        except OSError as error:
+            if error.errno != EWOULDBLOCK:
+                return
+        time.sleep(PAUSE)
+    raise ValueError(f"{path}: another process is writing it; choose another name, or wait for it")
 
 
 def is_locked(path: Path) -> bool:
-    """Return True if another process is writing the file."""
+    """Return True if another process is writing the file. Calls at the same time do not disturb each other."""
     try:
-        OutputLock(path).close()
-    except ValueError:
-        return True
+        descriptor = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     except OSError:
         return False
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_SH | fcntl.LOCK_NB)
+    except OSError as error:
+        return error.errno == EWOULDBLOCK
+    finally:
+        os.close(descriptor)
     return False
 
 

@@ -145,6 +145,8 @@ def _expectation(kind: str, message: str, context: dict[str, Any], hint: Any) ->
         return "a list"
     if kind == "too_short":
         return f"at least {context['min_length']} of them"
+    if kind == "too_long":
+        return f"at most {context['max_length']} of them"
     if kind == "string_pattern_mismatch":
         return f"a text of the form {context['pattern']}"
     if kind in ("string_type", "bool_type"):

@@ -1,5 +1,6 @@
 """Locks of outputs: two processes never write the same file."""
 
+import fcntl
 import subprocess
 import sys
 from pathlib import Path
@@ -28,6 +29,15 @@ def test_open_locked_rejects_second_writer_and_keeps_content(tmp_path):
     assert not is_locked(path)
     open_locked(path).close()
     assert path.read_bytes() == b""
+
+
+def test_writer_waits_for_the_end_of_a_look(tmp_path, monkeypatch):
+    path = tmp_path / "log"
+    look = path.open("w")
+    fcntl.flock(look, fcntl.LOCK_SH)
+    assert not is_locked(path)  # two looks do not disturb each other
+    monkeypatch.setattr("time.sleep", lambda _: look.close())
+    open_locked(path).close()
 
 
 def test_shared_locks_exclude_exclusive_locks_only(tmp_path):

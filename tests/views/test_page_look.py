@@ -82,3 +82,17 @@ def test_plots_fit_on_paper_and_in_the_window_again(tmp_path):
     assert max(paper) <= PAPER
     assert len(paper) > len(window)  # those of closed sections, too
     assert max(again) == max(window)
+
+
+@pytest.mark.long
+@pytest.mark.skipif(chromium.PROGRAM is None, reason="needs Chromium")
+def test_headings_stand_beside_their_triangles_on_phone(tmp_path):
+    page = write(page_looks.flight(), tmp_path / "flight.html")
+    with chromium.Browser(page, size=(300, 900)) as browser:
+        browser.run(page_looks.DRAWN)
+        offsets = browser.run(
+            "const top = (box) => box.getClientRects()[0].top;"
+            "return [...document.querySelectorAll('summary')].map((row) => top(row.querySelector('h2')) - top(row));"
+        )
+    assert len(offsets) > 5
+    assert max(offsets) < 12.0

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from datetime import datetime
 from pathlib import Path
+from stat import S_ISREG
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -141,11 +142,16 @@ class RecentFlights:
         self._lock = threading.Lock()
 
     def names(self) -> list[str]:
-        """Return the file names of the logs, the newest first, without those that are being written."""
-        paths = [path for path in self._folder.glob("*.mcap") if path.is_file()] if self._folder.is_dir() else []
-        dated = [
-            (modified, path.name) for path in paths if (modified := modification_time(path)) and not is_locked(path)
-        ]
+        """Return the file names of the logs, the newest first, without those that are being written.
+
+        That of a run that is starting is empty.
+        """
+        dated = []
+        for path in self._folder.glob("*.mcap"):
+            with suppress(OSError):  # deleted meanwhile
+                status = path.stat()
+                if S_ISREG(status.st_mode) and status.st_size and not is_locked(path):
+                    dated.append((status.st_mtime_ns, path.name))
         return [name for _, name in sorted(dated, reverse=True)[:MOST]]
 
     def path(self, name: str) -> Path:

@@ -7,11 +7,9 @@
     for (const { isIntersecting, target } of entries) {
       if (!isIntersecting) continue;
       near.unobserve(target);
-      const again = () => setTimeout(() => near.observe(target), 2000); // the server is busy
       fetch(target.dataset.load).then(async (answer) => {
         if (answer.ok) target.outerHTML = await answer.text();
-        else if (answer.status >= 500) again();
-      }, again);
+      }, () => {});
     }
   }, { rootMargin: "300px" });
   all("[data-load]").forEach((card) => near.observe(card));

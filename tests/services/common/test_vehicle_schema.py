@@ -89,9 +89,14 @@ def test_vehicle_mass_sets_airframe_mass(overrides):
             ["vehicle.mass=9", "airframe.mass.total=8"],
             "override vehicle.mass: 9 kg, but airframe.mass.total = 8 kg; expected one of them",
         ),
+        (
+            "hover",
+            ["vehicle.initial_position=[0, 0, 8]"],
+            "override vehicle.initial_position: expected at most 2 of them, got [0, 0, 8]",
+        ),
         ("gyrostat_chaotic", ["vehicle.mass=9"], "override vehicle.mass: the vehicle has no airframe"),
     ],
 )
-def test_invalid_vehicle_mass_is_rejected(scene, overrides, message):
+def test_invalid_value_of_vehicle_is_rejected(scene, overrides, message):
     with pytest.raises(SceneError, match=re.escape(message)):
         load(scene, overrides)

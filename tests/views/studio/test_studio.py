@@ -6,6 +6,7 @@ import socket
 import subprocess
 import sys
 import tomllib
+from http.client import HTTPConnection
 
 import pytest
 
@@ -191,6 +192,23 @@ def test_cards_of_flights_have_picture_and_outcome(studio, folder, flown):
         assert "timed out" in card or "completed" in card
     assert logs(folder)[0] in studio.page("?q=hover+" + ("timed" if "timed out" in card else "completed"))
     assert logs(folder)[0] not in studio.page("?q=hover+crashed")
+
+
+def test_finished_logs_are_found_by_cards_that_load_at_the_same_time(start, tmp_path):
+    logs = tmp_path / "recordings"
+    logs.mkdir()
+    for number in range(4):
+        (logs / f"{number}.mcap").write_text("no log")
+    (logs / "starts.mcap").touch()
+    studio = start(tmp_path)
+    assert "0.mcap" in (home := studio.page(""))
+    assert "starts.mcap" not in home
+    host = studio.origin.removeprefix("http://")
+    for _ in range(20):
+        clients = [HTTPConnection(host, timeout=300.0) for _ in range(40)]
+        for number, client in enumerate(clients):
+            client.request("GET", f"/{studio.token}/flights/{number % 4}.mcap/card")
+        assert {client.getresponse().status for client in clients} == {200}
 
 
 def test_comparison_names_differences_of_flights(studio, folder, flown):

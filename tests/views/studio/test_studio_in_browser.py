@@ -86,7 +86,6 @@ def fly(user, changed):
     return command
 
 
-@pytest.mark.nightly  # beside three other workers the cards of flights once did not appear; the cause is not known
 def test_user_selects_changes_runs_views_and_compares(start, tmp_path):
     studio = start(tmp_path)
     with chromium.Browser(studio.address, (1280, 900)) as browser:
