@@ -181,8 +181,12 @@ def _partial(schema: Schema, place: str) -> Schema:
 
 
 def _or_own(tables: dict[str, Schema]) -> Schema:
-    """Return the schema of these tables and of user-defined ones, which name a module."""
-    return {**closed_table(tables), "additionalProperties": OWN}
+    """Return the schema of these tables, or false, and of user-defined ones, which name a module."""
+    or_false = {"type": ["object", "boolean"], "not": {"const": True}}
+    return {
+        **closed_table({name: {**table, **or_false} for name, table in tables.items()}),
+        "additionalProperties": OWN,
+    }
 
 
 def _effect(name: str) -> Schema:

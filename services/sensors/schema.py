@@ -123,6 +123,8 @@ class Sensors(NamedTables):
     def check(self, scene: Scene) -> None:
         """Check that every sensor exists, its parameters are valid, and its rate divides the communication rate."""
         super().check(scene)
+        for name in self.switched_off - set(sensors()):
+            raise ConfigError.unknown(f"{self.TABLE}.{name}", "sensor", name, sensors())
         for name, table in self.tables.items():
             if "module" in table and not name.isidentifier():
                 raise ConfigError(f"sensors.{name}", f"got {name!r}", "a valid topic name: letters, digits, _")

@@ -17,7 +17,16 @@ class NamedTables(SceneTable):
 
     @property
     def tables(self) -> Mapping[str, Any]:
-        """Subtables of the scene by name."""
+        """Subtables of the scene by name, without those that `NAME = false` switches off."""
+        return {name: table for name, table in self._entries.items() if table is not False}
+
+    @property
+    def switched_off(self) -> set[str]:
+        """Names of the entries that are false."""
+        return {name for name, table in self._entries.items() if table is False}
+
+    @property
+    def _entries(self) -> Mapping[str, Any]:
         return self.__pydantic_extra__ or {}
 
     @classmethod
@@ -32,7 +41,7 @@ class NamedTables(SceneTable):
         """Raise ConfigError unless every entry is a table."""
         for name, table in self.tables.items():
             if not isinstance(table, dict):
-                raise ConfigError(f"{self.TABLE}.{name}", f"got {table!r}", f"a table [{self.TABLE}.{name}]")
+                raise ConfigError(f"{self.TABLE}.{name}", f"got {table!r}", f"a table [{self.TABLE}.{name}], or false")
 
     def load(self, scene: Scene) -> None:
         """Import the user modules. Raise ConfigError if one cannot be imported."""

@@ -1,6 +1,5 @@
 """Scene tables of the vehicle, its airframe and its effects, and quantities derived from them."""
 
-from collections.abc import Mapping
 from functools import partial
 from typing import Any, ClassVar, NamedTuple
 
@@ -98,11 +97,6 @@ class Effects(NamedTables):
 
     TABLE: ClassVar[str] = "effects"
 
-    @property
-    def tables(self) -> Mapping[str, Any]:
-        """Subtables of the scene by name; `collision = false` only says that vehicles may pass through each other."""
-        return {name: table for name, table in super().tables.items() if (name, table) != ("collision", False)}
-
     @classmethod
     def embed(cls, tree: dict[str, Any], files: Files) -> None:
         """Store user modules, and read the files that effects name into their tables."""
@@ -118,6 +112,8 @@ class Effects(NamedTables):
     def check(self, scene: Scene) -> None:
         """Raise ConfigError unless all effects exist, have valid parameters and are compatible."""
         super().check(scene)
+        for name in self.switched_off - set(effects.names()):
+            raise ConfigError.unknown(f"{self.TABLE}.{name}", "effect", name, effects.names())
         active(scene)
 
 

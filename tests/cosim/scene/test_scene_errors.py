@@ -103,7 +103,7 @@ def test_choices_are_listed():
         ("run.seed=1.5", "override run.seed: expected a whole number at least 0 and below 9.22337e+18, got 1.5"),
         ("run.duration=nan", "override run.duration: expected a finite number, got nan"),
         ("run=3", "override run: expected a table [run], got 3"),
-        ("effects.gravity=3", "override effects.gravity: expected a table [effects.gravity], got 3"),
+        ("effects.gravity=3", "override effects.gravity: expected a table [effects.gravity], or false, got 3"),
         ("vehicle.name=1x", "override vehicle.name: expected a text of the form"),
         ("communication.rate=300", "override communication.rate: expected a rate with a whole number of ns"),
         (
@@ -197,3 +197,22 @@ def test_other_files_are_rejected_as_scenes(tmp_path):
     assert "not valid TOML: not a UTF-8 text file" in error_text(tmp_path / "binary.toml")
     (tmp_path / "flight.mcap").write_bytes(b"\x89MCAP0\r\n\x01")
     assert "is a log (MCAP); expected a scene file (TOML)" in error_text(tmp_path / "flight.mcap")
+
+
+def test_false_switches_an_effect_or_a_sensor_off():
+    scene = load("delivery_full", ["effects.ground_contact=false", "sensors.sonar=false"])
+    assert "ground_contact" not in scene.tables("effects")
+    assert "gravity" in scene.tables("effects")
+    assert set(scene.tables("sensors")) == {"barometer", "gps", "imu", "magnetometer"}
+
+
+@pytest.mark.parametrize(
+    ("override", "expected"),
+    [
+        ("effects.bodydrag=false", "effects.bodydrag: unknown effect 'bodydrag'; did you mean body_drag?"),
+        ("sensors.sonr=false", "sensors.sonr: unknown sensor 'sonr'; did you mean sonar?"),
+        ("effects.gravity=true", "effects.gravity: expected a table [effects.gravity], or false, got True"),
+    ],
+)
+def test_only_known_entries_are_switched_off(override, expected):
+    assert expected in error_text(DELIVERY, override)
