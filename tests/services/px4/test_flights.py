@@ -20,6 +20,7 @@ from tests.participants import running
 from tests.services.firmware_links import fly, lapwing, program, scripted
 
 SCENE = Path(__file__).parents[3] / "lapwing/scenes/px4_quad.toml"
+HEXACOPTER = "--set", "vehicle.airframe=hexacopter"
 COUNTS = "skew 0 ms, resent 0, late 0, missed 0, rejected 0"
 
 
@@ -32,6 +33,16 @@ def test_scripted_firmware_flies_and_resimulates(tmp_path):
     assert report.startswith("px4: ")
     assert COUNTS in report
     lapwing("resimulate", log)
+
+
+@pytest.mark.long
+def test_scripted_firmware_flies_hexacopter(tmp_path):
+    """All rotors push and turn alike, so the vehicle stays level and keeps its heading."""
+    log = tmp_path / "flight.mcap"
+    fly("px4", scripted("px4", "--rotors", 6), "--log", log, *HEXACOPTER)
+    truth = Flight.read(log).truth
+    assert truth.position[:, 2].max() > 1.5
+    assert np.abs(truth.angular_velocity[truth.position[:, 2] > 0.5]).max() < 1e-3
 
 
 @pytest.mark.long
@@ -121,12 +132,13 @@ def test_invalid_mission_is_rejected(tmp_path):
 
 @pytest.mark.long
 @pytest.mark.skipif("PX4" not in os.environ, reason="PX4 names no px4 program")
-def test_px4_flies_its_square(tmp_path):
+@pytest.mark.parametrize("vehicle", [(), HEXACOPTER], ids=["quadrotor", "hexacopter"])
+def test_px4_flies_its_square(tmp_path, vehicle):
     log, binary = tmp_path / "flight.mcap", Path(os.environ["PX4"]).resolve()
     command = [str(binary), "-d", str(binary.parents[1] / "etc")]
     environment = 'autopilot.environment={PX4_SIM_MODEL = "none_iris"}'
     links = "autopilot.instance=8"  # missions go to instances 0 to 9 only
-    result = fly("px4", command, "--log", log, "--set", environment, "--set", links)
+    result = fly("px4", command, "--log", log, "--set", environment, "--set", links, *vehicle)
     assert "Landed" in result.stdout
     with LogReader(log) as reader:
         assert "skew 0 ms" in reader.metadata["firmware"]
