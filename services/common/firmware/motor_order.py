@@ -1,5 +1,6 @@
 """Assignment of a firmware's outputs to the rotors of the airframe."""
 
+from functools import partial
 from typing import NamedTuple
 
 from lapwing.cosim.scene import Scene
@@ -79,8 +80,8 @@ def motors(scene: Scene) -> Motors:
         except ConfigError as error:
             faults.append(error)
             continue
-        for name in parameters.keys() & FRAME_KEYS:
-            if chosen.get(name, parameters[name]) != parameters[name]:
+        for name in FRAME_KEYS:
+            if name in parameters and chosen.get(name, parameters[name]) != parameters[name]:
                 expected = f"{parameters[name]:g} for the rotors of this airframe"
                 raise ConfigError(f"autopilot.parameters.{name}", f"got {chosen[name]:g}", expected)
         return Motors(order, parameters)
@@ -104,7 +105,7 @@ def _px4(frame: Airframe, chosen: dict[str, float]) -> tuple[dict[str, float], t
 def motor_order(frame: Airframe, layout: tuple[Output, ...], firmware: str) -> tuple[int, ...]:
     """Return for each rotor of the airframe the number (from 0) of the firmware's output that drives it.
 
-    A rotor belongs to the output in the nearest direction; of two in this direction, to that with its spin.
+    A rotor belongs to the output in the nearest direction; of several there, to that with its spin, then the nearest.
 
     Raises:
         ConfigError: a rotor is between two outputs, two rotors share an output, or a spin direction differs.
@@ -112,11 +113,20 @@ def motor_order(frame: Airframe, layout: tuple[Output, ...], firmware: str) -> t
     places, spins = frame.rotors.position, frame.rotors.spin_direction
     directions = len({(o.forward, o.left) for o in layout})
     least, order = math.cos(NEAR * 2.0 * math.pi / directions), []
-    for k, (x, y, _) in enumerate(places):
-        scale = [(math.hypot(x, y) * math.hypot(o.forward, o.left)) or 1.0 for o in layout]
-        cosines = [round((x * o.forward + y * o.left) / s, 9) for o, s in zip(layout, scale, strict=True)]
-        order.append(max(range(len(layout)), key=lambda i: (cosines[i], layout[i].spin == spins[k])))
-        if cosines[order[k]] < least:
+
+    def nearness(k: int, i: int) -> tuple[float, bool, float]:
+        """Return cosine of the angle between a rotor and an output, equality of their spins, negative distance."""
+        (x, y, _), o = places[k], layout[i]
+        scale = math.hypot(x, y) * math.hypot(o.forward, o.left) or 1.0
+        return (
+            round((x * o.forward + y * o.left) / scale, 9),
+            spins[k] == o.spin,
+            -math.hypot(x - o.forward, y - o.left),
+        )
+
+    for k in range(len(places)):
+        order.append(max(range(len(layout)), key=partial(nearness, k)))
+        if nearness(k, order[k])[0] < least:
             message = f"rotor {k + 1} is between the directions of two outputs of {firmware}"
             raise ConfigError("airframe.rotors.position", message, "an airframe in X")
     if sorted(order) != list(range(len(layout))):

@@ -29,6 +29,10 @@ def octocopter(spins):
 
 PAIRS = rotors([[x, y, z] for x, y in ((0.3, 0.3), (-0.3, 0.3), (-0.3, -0.3), (0.3, -0.3)) for z in (0.0, 0.1)],
                "cw ccw ccw cw cw ccw ccw cw")  # fmt: skip
+TWO_EACH_ARM = rotors(
+    [[x * s, y * s, 0.0] for x, y in ((0.3, 0.3), (-0.3, 0.3), (-0.3, -0.3), (0.3, -0.3)) for s in (1, 2)],
+    "cw cw ccw ccw cw cw ccw ccw",
+)
 ARDUPILOT = {  # angle from ahead to the right [deg] and yaw factor of each motor in AP_MotorsMatrix.cpp
     (1, 1): ((45, 1), (-135, 1), (-45, -1), (135, -1)),
     (2, 1): ((90, -1), (-90, 1), (-30, -1), (150, 1), (30, 1), (-150, -1)),
@@ -62,7 +66,8 @@ OUTPUTS = {"ardupilot": ardupilot_outputs, "px4": px4_outputs}
     ("firmware", "vehicle"),
     [("ardupilot", {}), ("ardupilot", ALTERNATING), ("ardupilot", octocopter("cw ccw " * 4)),
      ("ardupilot", octocopter("ccw cw " * 4)), ("ardupilot", PAIRS), ("px4", HEXACOPTER), ("px4", ALTERNATING),
-     ("px4", octocopter("cw ccw " * 4)), ("px4", octocopter("ccw ccw cw cw " * 2)), ("px4", PAIRS)],
+     ("px4", octocopter("cw ccw " * 4)), ("px4", octocopter("ccw ccw cw cw " * 2)), ("px4", PAIRS),
+     ("px4", TWO_EACH_ARM)],
 )  # fmt: skip
 def test_command_of_roll_pitch_and_yaw_produces_this_torque(firmware, vehicle):
     scene = load(f"{firmware}_quad", vehicle)
