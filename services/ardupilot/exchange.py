@@ -16,7 +16,6 @@ from lapwing.services.common.ports import TrueState
 
 __all__ = ["step"]
 MARGIN = 1e-9  # [s] added to each step: ArduPilot cuts steps to whole microseconds
-OUTPUTS = 4
 SEA_LEVEL_DENSITY = 1.225  # [kg/m^3] of indicated airspeed
 _HEAD = 8  # [bytes] before the pulse widths
 
@@ -115,11 +114,11 @@ def exchange(p: ArduPilotExchange, tick: int) -> int:
     size = receive(c)
     if _is_expected(p, size):
         p.next_count[0] += 1
-        for k in range(OUTPUTS):
+        for k in range(len(e.outputs)):
             e.outputs[k] = throttle(_unsigned16(c.received, _HEAD + 2 * k), p.pulses[0], p.pulses[1])
     elif not call_python(e, tick, WAIT, size):
         return FAILED
     running = 0
-    for k in range(OUTPUTS):
+    for k in range(len(e.outputs)):
         running = 1 if e.outputs[k] > 0.0 else running
     return running  # a heartbeat comes only once a second

@@ -12,7 +12,7 @@ import numpy as np
 
 from lapwing.cosim.diagram.compiled_block import InputRing
 from lapwing.kernels import math
-from lapwing.services.ardupilot.exchange import OUTPUTS, ArduPilotExchange, Samples
+from lapwing.services.ardupilot.exchange import ArduPilotExchange, Samples
 from lapwing.services.ardupilot.modes import CONVENTIONS
 from lapwing.services.ardupilot.resolve import LOOP_RATE, NAME, ArduPilotConfig
 from lapwing.services.ardupilot.servo_packet import (
@@ -73,7 +73,7 @@ class SimulatedSensors:
 class ArduPilotLink(MavlinkLink):
     """Connection to one ArduPilot SITL."""
 
-    outputs, CONVENTIONS = OUTPUTS, CONVENTIONS
+    CONVENTIONS = CONVENTIONS
     INSTANCES, OWN_LOGS = 100, "logs/*.BIN"
     OWN_PORTS = (*(OwnPort(TCP, MAVLINK_PORT + k, STRIDE) for k in (0, 2, 3)), OwnPort(UDP, RC_PORT, STRIDE))
 
@@ -170,7 +170,8 @@ class ArduPilotLink(MavlinkLink):
         self._was_resent, timeout = False, self._config.step_timeout
         for _ in self._attempts("ardupilot", timeout):
             if packet := self._process(size):
-                self._shared.outputs[:] = [throttle(pwm, *self._pulses) for pwm in packet.pwm[:OUTPUTS]]
+                pulses = packet.pwm[: len(self._shared.outputs)]
+                self._shared.outputs[:] = [throttle(pwm, *self._pulses) for pwm in pulses]
                 return
             if size < 0 and self._was_resent:
                 self._was_resent = False

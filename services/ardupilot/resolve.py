@@ -10,6 +10,7 @@ from lapwing.services.ardupilot.schema import ArduPilot
 from lapwing.services.common import ports
 from lapwing.services.common.firmware.firmware_config import firmware_config, fleet, latencies
 from lapwing.services.common.firmware.mission import with_mission
+from lapwing.services.common.firmware.motor_order import motors
 from lapwing.services.common.firmware.schema import firmware_of
 from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.common.schemas.communication_schema import Communication
@@ -25,7 +26,6 @@ SIMULATED = {  # parameters [ms] of the delay of ArduPilot's model of each senso
 }
 DELAY_MIN = 1.0  # [ms] GPS1_DELAY_MS, where 0 stands for the delay that ArduPilot expects of a kind of receiver
 VOLTAGE_AND_CURRENT = 4.0  # BATT_MONITOR
-FOUR_MOTORS = 15.0  # SIM_VIB_MOT_MASK
 LOOP_RATE = 400  # [Hz] of ArduCopter's main loop, which the rate of the exchange must exceed
 
 
@@ -39,7 +39,7 @@ class ArduPilotConfig(NamedTuple):
     range_port: str  # port of the distance sensor; "": none
     airspeed: bool
     gps: bool  # the scene has a receiver, whose outages are sent to ArduPilot
-    parameters: dict[str, float]  # ArduPilot parameters that describe the scene's sensors and battery
+    parameters: dict[str, float]  # ArduPilot parameters that describe the scene's sensors, battery and rotors
 
 
 def resolve(scene: Scene) -> ServiceConfig | None:
@@ -77,13 +77,15 @@ def resolve(scene: Scene) -> ServiceConfig | None:
 
 
 def sensor_parameters(scene: Scene) -> dict[str, float]:
-    """Return the ArduPilot parameters that describe the scene: delays and rate of its sensors.
+    """Return the ArduPilot parameters that describe the scene: its rotors, delays and rate of its sensors.
 
     BATT_MONITOR = 4: ArduPilot measures the plant's battery, and its log has the voltage. SIM_VIB_MOT_MASK names the
     motors whose throttle lowers this voltage, which `SimulatedSensors` compensates; by default 4.7 knows none.
     ArduPilot's parameters of IMU noise, 0 by default, then act in flight; there is no vibration without them.
     """
-    result = {"BATT_MONITOR": VOLTAGE_AND_CURRENT, "SIM_VIB_MOT_MASK": FOUR_MOTORS, **latencies(scene, SIMULATED)}
+    order, result = motors(scene)
+    result |= {"BATT_MONITOR": VOLTAGE_AND_CURRENT, "SIM_VIB_MOT_MASK": 2.0 ** len(order) - 1.0}
+    result |= latencies(scene, SIMULATED)
     if ports.GPS in scene.tables("sensors"):
         rate = scene.lookup(f"sensors.{ports.GPS}.rate")
         result |= {"SIM_GPS1_HZ": rate, "SIM_GPS_HZ": rate}

@@ -10,7 +10,6 @@ from lapwing.services.px4.messages import ARMED, LOCK_STEP
 from lapwing.services.px4.sensor_frame import NONE, Frame, Sensors, read_controls, write_sensors
 
 __all__ = ["step"]
-OUTPUTS = 4
 MESSAGES = 100  # reason to call Python: append the messages of `rare_messages`
 _IMU, _MAGNETOMETER, _BAROMETER, _AIRSPEED = range(4)
 
@@ -83,10 +82,10 @@ def _is_answer(p: Px4Exchange, size: int, time_us: int) -> bool:
         return False
     if m.words[0] != time_us or m.words[1] & LOCK_STEP == 0:
         return False
-    for k in range(OUTPUTS):
+    for k in range(len(p.shared.outputs)):
         if not math.isfinite(m.floats[4 + k]):
             return False
-    for k in range(OUTPUTS):
+    for k in range(len(p.shared.outputs)):
         p.shared.outputs[k] = m.floats[4 + k]
     p.armed[0], p.silent[0] = m.bytes[90] & ARMED != 0, 0
     return True

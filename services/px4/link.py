@@ -30,7 +30,7 @@ from lapwing.services.common.firmware.repeatable import Turns
 from lapwing.services.common.firmware.service import firmware_service
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.ports import AirspeedReading
-from lapwing.services.px4.exchange import MESSAGES, OUTPUTS, Px4Exchange, Readings, is_new
+from lapwing.services.px4.exchange import MESSAGES, Px4Exchange, Readings, is_new
 from lapwing.services.px4.messages import ARMED, LOCK_STEP, RC, rare_messages
 from lapwing.services.px4.modes import CONVENTIONS
 from lapwing.services.px4.resolve import NAME, Px4Config
@@ -50,7 +50,7 @@ IDLE = mavlink.MAVLink_hil_actuator_controls_message(0, [0.0] * 16, 0, LOCK_STEP
 class Px4Link(MavlinkLink):
     """Connection to one PX4 SITL."""
 
-    outputs, CONVENTIONS = OUTPUTS, CONVENTIONS
+    CONVENTIONS = CONVENTIONS
     INSTANCES, OWN_LOGS = 10, "log/**/*.ulg"  # instances with separate MAVLink ports
     OWN_PORTS = tuple(  # its ends of the links to onboard computer, ground station, payload and gimbal
         OwnPort(UDP, port) for port in (14580, 18570, 14280, 13030)
@@ -272,7 +272,7 @@ class Px4Link(MavlinkLink):
         for message in messages:
             if not message.flags & LOCK_STEP:
                 self._fail("it runs without lock step", "build px4_sitl_default")
-            result, motors = message.time_usec, message.controls[:OUTPUTS]
+            result, motors = message.time_usec, message.controls[: len(self._shared.outputs)]
             if self.in_turns and result == 0:
                 continue
             if all(map(math.isfinite, motors)):

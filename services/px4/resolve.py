@@ -13,6 +13,7 @@ from lapwing.kernels import python_function
 from lapwing.services.common import ports
 from lapwing.services.common.firmware.firmware_config import firmware_config, fleet, latencies
 from lapwing.services.common.firmware.mission import with_mission
+from lapwing.services.common.firmware.motor_order import motors
 from lapwing.services.common.firmware.schema import firmware_of
 from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.common.schemas.communication_schema import ticks
@@ -63,7 +64,7 @@ class Px4Config(NamedTuple):
     force_body: Vec3  # [m/s^2] specific force at rest at the start
     field_body: Vec3  # [T] magnetic field there
     pressure: float  # [Pa] there
-    parameters: dict[str, float]  # PX4 parameters that describe the scene's sensors, radio and battery
+    parameters: dict[str, float]  # PX4 parameters that describe the scene's sensors, radio, battery and rotors
     rc: Sequence[Sequence[float]] = ()  # rows of `Px4.rc`
 
 
@@ -101,14 +102,15 @@ def resolve(scene: Scene) -> ServiceConfig | None:
 
 
 def sensor_parameters(scene: Scene) -> dict[str, float]:
-    """Return the PX4 parameters that describe the scene: delays of its sensors, rate of its IMU.
+    """Return the PX4 parameters that describe the scene: its rotors, delays of its sensors, rate of its IMU.
 
-    SIM_BAT_ENABLE = 0: PX4 gets the state of the plant's battery instead of its own simulation. COM_FLTT_LOW_ACT = 1
-    (warning): until mid-2026, PX4 takes the unknown remaining flight time of such a battery for 0 s, and would return
-    at once; 0 (no action) would hold for 5 s.
+    SIM_BAT_ENABLE = 0, from 1.17 SIM_BAT_DRAIN = 0: PX4 gets the state of the plant's battery instead of its own
+    simulation. COM_FLTT_LOW_ACT = 1 (warning): until mid-2026, PX4 takes the unknown remaining flight time of such a
+    battery for 0 s, and would return at once; 0 (no action) would hold for 5 s.
     """
     delays = latencies(scene, DELAYS)
-    result = {"SIM_BAT_ENABLE": 0.0, "COM_FLTT_LOW_ACT": 1.0, "EKF2_DELAY_MAX": max(DELAY_MAX, *delays.values())}
+    result = {"SIM_BAT_ENABLE": 0.0, "SIM_BAT_DRAIN": 0.0, "COM_FLTT_LOW_ACT": 1.0}
+    result["EKF2_DELAY_MAX"] = max(DELAY_MAX, *delays.values())
     result |= dict(FUSED[name] for name in scene.tables("sensors") if name in FUSED)
     rate = scene.lookup(f"sensors.{ports.IMU}.rate")
-    return result | delays | ({"IMU_INTEG_RATE": rate} if rate in IMU_RATES else {})
+    return result | motors(scene).parameters | delays | ({"IMU_INTEG_RATE": rate} if rate in IMU_RATES else {})

@@ -10,7 +10,7 @@ import numpy as np
 from lapwing.cosim.scene import Overrides, Scene
 from lapwing.flights.log_import.open_flight import open_flight
 from lapwing.flights.log_import.recording import Recording
-from lapwing.services.common.firmware.motor_order import QUADROTOR_X, motor_order
+from lapwing.services.common.firmware.motor_order import motors
 from lapwing.services.common.firmware.schema import firmware_of
 from lapwing.services.common.schemas.vehicle_schema import airframe
 from lapwing.services.scene_resolver import load_one
@@ -225,9 +225,8 @@ def on_rotors(base: Scene, recordings: Sequence[Recording]) -> list[Recording]:
     result = []
     for recording in recordings:
         volts = recording.in_volts(frame.motor.max_voltage)
-        if recording.firmware == firmware and recording.rotors == len(QUADROTOR_X):
-            order = list(motor_order(frame, QUADROTOR_X, firmware))
-            volts = replace(volts, motor_voltage=volts.motor_voltage[:, order])
+        if recording.firmware == firmware and recording.rotors == len(frame.rotors.position):
+            volts = replace(volts, motor_voltage=volts.motor_voltage[:, list(motors(base).order)])
         result.append(volts)
     return result
 

@@ -77,7 +77,7 @@ class FirmwareBlock:
         if not hasattr(self._link, "exchange"):
             return
         self._python = _PYTHON(self._on_call)
-        self._shared = shared_memory(self._config, diagram.ring(COMMAND), self._link.outputs, self._python)
+        self._shared = shared_memory(self._config, diagram.ring(COMMAND), self._python)
         code = diagram.prepare(Block(self.name, self._link.exchange(self._shared, self._ring), Cell(0)))
         diagram.replace(diagram.block(self.name), code)
 

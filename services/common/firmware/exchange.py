@@ -36,7 +36,7 @@ class Shared(NamedTuple):
     order: tuple[int, ...]  # output that drives each rotor
     none: PerRotor  # zero for each rotor
     command: Any  # row of the port `hold.COMMAND`
-    outputs: Any  # (n,) firmware outputs, 0 to 1
+    outputs: Any  # (n,) firmware outputs, 0 to 1, one for each rotor
     flags: Any  # int64: state of the vehicle from the MAVLink link, index of the status texts
     next_poll: Any  # (1,) tick
     steps: Any  # (1,) exchanges
@@ -48,18 +48,17 @@ class Shared(NamedTuple):
     python: int  # `python(tick, reason, number) -> 0 to continue`
 
 
-def shared_memory(config: Any, command: np.ndarray, outputs: int, python: Any) -> Shared:
+def shared_memory(config: Any, command: np.ndarray, python: Any) -> Shared:
     """Return the memory of an exchange.
 
     Args:
         config: `FirmwareConfig` of the adapter.
         command: row of the port `hold.COMMAND`.
-        outputs: number of outputs of the firmware.
         python: ctypes function that compiled code calls.
     """
     clock = np.zeros(2, np.int64)
     return Shared(
-        config.period, config.interval, config.order, (0.0,) * len(config.order), command, np.zeros(outputs),
+        config.period, config.interval, config.order, (0.0,) * len(config.order), command, np.zeros(len(config.order)),
         np.array([0, 1, 0, 0]), np.zeros(1, np.int64), np.zeros(1, np.int64), np.zeros(4), clock, clock.ctypes.data,
         time.CLOCK_MONOTONIC, address_of(ctypes.CDLL(None).clock_gettime), address_of(python),
     )  # fmt: skip

@@ -7,7 +7,7 @@ from lapwing.cosim.config.run_config import ServiceConfig
 from lapwing.cosim.diagram.tick_schedule import InputPort, Port
 from lapwing.cosim.scene import Scene
 from lapwing.services.common import ports
-from lapwing.services.common.firmware.motor_order import QUADROTOR_X, motor_order
+from lapwing.services.common.firmware.motor_order import motors
 from lapwing.services.common.firmware.schema import TABLE, FirmwareKeys
 from lapwing.services.common.ports import AutopilotStatus, MotorCommand, Setpoint
 from lapwing.services.common.schemas.communication_schema import Communication, Rates, ticks
@@ -66,7 +66,7 @@ def firmware_config(scene: Scene, inputs: tuple[str, ...], period: int, own: Any
     config = FirmwareConfig(
         **{name: getattr(table, name) for name in (*FirmwareKeys.model_fields, "parameters")},
         chooses=bool(table.command) and table.instance is None and table.port is None,
-        order=motor_order(frame, QUADROTOR_X, table.firmware),
+        order=motors(scene).order,
         voltage_max=frame.motor.max_voltage,
         start_world=start_place(scene),
         interval=exchange.interval,

@@ -5,14 +5,19 @@ import os
 import socket
 from pathlib import Path
 
+import numpy as np
 import pytest
 
+from lapwing.api.flight import Flight
 from lapwing.cosim.log import LogReader
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.runs.resimulate import recorded_config
 from lapwing.services.ardupilot.link import MAVLINK_PORT, STRIDE
 from lapwing.services.scene_resolver import load, resolve
 from tests.services.firmware_links import fly, lapwing, program, scripted
+
+SPINS = json.dumps(["cw", "ccw"] * 3)  # the shipped hexacopter has another order, which ArduPilot does not fly
+HEXACOPTER = "--set", "vehicle.airframe=hexacopter", "--set", f"airframe.rotors.spin_direction={SPINS}"
 
 
 def run(folder, *options, seconds=15.0, settings=(), code=None):
@@ -30,6 +35,16 @@ def test_scripted_firmware_flies_and_resimulates(tmp_path):
     assert repeatable == "yes"
     assert "skew 0 ms, resent 0, late 0, missed 0, rejected 0, reconnected 0" in report
     lapwing("resimulate", tmp_path / "flight.mcap")
+
+
+@pytest.mark.long
+def test_scripted_firmware_turns_hexacopter_without_a_tilt(tmp_path):
+    run(tmp_path, "--rotors", 6, "--yaw", 0.05, seconds=9.0, settings=HEXACOPTER)
+    truth = Flight.read(tmp_path / "flight.mcap").truth
+    rate = truth.angular_velocity[truth.position[:, 2] > 0.5]
+    assert truth.position[:, 2].max() > 1.5
+    assert rate[:, 2].max() > 0.1  # to the left
+    assert np.abs(rate[:, :2]).max() < 1e-3
 
 
 @pytest.mark.long
@@ -116,13 +131,15 @@ def test_mission_is_part_of_configuration():
 
 @pytest.mark.long
 @pytest.mark.skipif("ARDUCOPTER" not in os.environ, reason="ARDUCOPTER names no arducopter program")
-def test_arducopter_flies_its_square(tmp_path):
+@pytest.mark.parametrize("vehicle", [(), HEXACOPTER], ids=["quadrotor", "hexacopter"])
+def test_arducopter_flies_its_square(tmp_path, vehicle):
     log, binary = tmp_path / "flight.mcap", Path(os.environ["ARDUCOPTER"]).resolve()
-    assert "Landed" in fly("ardupilot", [binary], "--log", log).stdout
+    assert "Landed" in fly("ardupilot", [binary], "--log", log, *vehicle).stdout
     with LogReader(log) as reader:
         assert "skew 0 ms" in reader.metadata["firmware"]
         assert reader.metadata["repeatable"] == "yes"
     lapwing("resimulate", log)  # the firmware flies again
-    lapwing("validate", "ardupilot_quad", tmp_path / "flight.ardupilot.bin", "--json", tmp_path / "errors.json")
+    own = tmp_path / "flight.ardupilot.bin"
+    lapwing("validate", "ardupilot_quad", own, *vehicle, "--json", tmp_path / "errors.json")
     (flight,) = json.loads((tmp_path / "errors.json").read_text())["flights"].values()
     assert flight["thrust_ratio"] == pytest.approx(1.0, abs=0.02)

@@ -5,7 +5,7 @@ answers; with `--stall` it stops answering in flight; with `--stop` it is halted
 there for 3 s. With `--starts FILE` it appends its instance and process id to a file. With `--cores FILE` it writes, in
 flight, the cores of its thread and of each thread of its parent process. With `--estimate BIAS` it sends the true state
 as its estimate, with a bias of the velocity north [m/s]. With `--received FILE` it writes a line with kind and instance
-of each message other than HIL_SENSOR 0.
+of each message other than HIL_SENSOR 0. With `--rotors 6` it has the outputs of a hexacopter.
 """
 
 import argparse
@@ -22,7 +22,8 @@ from pymavlink.dialects.v20 import all as mavlink
 from tests.services.px4.peer import Px4Peer, instance
 from tests.services.stopped import stop_for
 
-HOVER, HEIGHT = 0.62, 2.0  # duty in hover; [m]
+HEIGHT = 2.0  # [m]
+HOVER = {4: 0.62, 6: 0.55}  # duty in hover, by rotors
 
 
 class VehicleSide:
@@ -106,7 +107,9 @@ def main():
     parser.add_argument("--cores", type=Path)
     parser.add_argument("--estimate", type=float)
     parser.add_argument("--received", type=Path)
+    parser.add_argument("--rotors", type=int, default=4)
     options = parser.parse_args()
+    hover = HOVER[options.rotors]
     if options.starts:
         with options.starts.open("a") as file:
             file.write(f"{options.i} {os.getpid()}\n")
@@ -137,7 +140,7 @@ def main():
             armed_at = armed_at or time_us
             elapsed = (time_us - armed_at) * 1e-6
             target = HEIGHT if elapsed < 5.0 else HEIGHT - 0.5 * (elapsed - 5.0)
-            duty = min(max(HOVER + 0.1 * (target - height) - 0.08 * rate, 0.0), 1.0)
+            duty = min(max(hover + 0.1 * (target - height) - 0.08 * rate, 0.0), 1.0)
             if elapsed > 12.0:
                 vehicle.armed, duty = False, 0.0
                 peer.armed = False
@@ -149,7 +152,7 @@ def main():
                 stop_for(3.0)
             if options.stall and elapsed > 3.0:
                 peer.receive("NEVER")
-        peer.answer(time_us, (duty,) * 4)
+        peer.answer(time_us, (duty,) * options.rotors)
         message = peer.receive()
 
 

@@ -20,6 +20,7 @@ from tests.participants import running
 from tests.services.firmware_links import fly, lapwing, program, scripted
 
 SCENE = Path(__file__).parents[3] / "lapwing/scenes/px4_quad.toml"
+HEXACOPTER = "--set", "vehicle.airframe=hexacopter"
 COUNTS = "skew 0 ms, resent 0, late 0, missed 0, rejected 0"
 
 
@@ -32,6 +33,16 @@ def test_scripted_firmware_flies_and_resimulates(tmp_path):
     assert report.startswith("px4: ")
     assert COUNTS in report
     lapwing("resimulate", log)
+
+
+@pytest.mark.long
+def test_scripted_firmware_flies_hexacopter(tmp_path):
+    """All rotors push and turn alike, so the vehicle stays level and keeps its heading."""
+    log = tmp_path / "flight.mcap"
+    fly("px4", scripted("px4", "--rotors", 6), "--log", log, *HEXACOPTER)
+    truth = Flight.read(log).truth
+    assert truth.position[:, 2].max() > 1.5
+    assert np.abs(truth.angular_velocity[truth.position[:, 2] > 0.5]).max() < 1e-3
 
 
 @pytest.mark.long
@@ -101,7 +112,7 @@ def test_delays_of_sensors_are_parameters_of_firmware():
 
     assert parameters("sensors.barometer.latency_samples=2").items() >= {
         "SENS_GPS0_DELAY": 100.0, "EKF2_BARO_DELAY": 40.0, "EKF2_MAG_DELAY": 0.0, "IMU_INTEG_RATE": 250.0,
-        "EKF2_DELAY_MAX": 200.0, "SIM_BAT_ENABLE": 0.0, "COM_FLTT_LOW_ACT": 1.0,
+        "EKF2_DELAY_MAX": 200.0, "SIM_BAT_ENABLE": 0.0, "SIM_BAT_DRAIN": 0.0, "COM_FLTT_LOW_ACT": 1.0,
     }.items()  # fmt: skip
     assert parameters("sensors.gps.latency_samples=3")["EKF2_DELAY_MAX"] == 300.0
 
@@ -120,17 +131,17 @@ def test_invalid_mission_is_rejected(tmp_path):
 
 
 FURTHER = [
-    "sensors.imu.instances=3", "sensors.gps.instances=2", "sensors.magnetometer.instances=2",
-    "sensors.optical_flow.preset=pmw3901", "sensors.rangefinder.preset=lidar_lite_v3",
-    "sensors.external_vision.preset=motion_capture", "px4.rc=[[0.0, 1500, 1500, 1000, 1500]]",
-]  # fmt: skip
+    *("--set", "sensors.imu.instances=3", "--set", "sensors.gps.instances=2"),
+    *("--set", "sensors.magnetometer.instances=2", "--set", "sensors.optical_flow.preset=pmw3901"),
+    *("--set", "sensors.rangefinder.preset=lidar_lite_v3", "--set", "sensors.external_vision.preset=motion_capture"),
+    *("--set", "px4.rc=[[0.0, 1500, 1500, 1000, 1500]]"),
+]
 KINDS = ["HIL_GPS 1", "HIL_OPTICAL_FLOW 0", "HIL_SENSOR 1", "HIL_SENSOR 2", "ODOMETRY 0", "RC_CHANNELS 0"]
 
 
 def test_further_sensors_and_radio_reach_the_firmware(tmp_path):
     command = scripted("px4", "--received", tmp_path / "received.txt")
-    sets = [text for pair in FURTHER for text in ("--set", pair)]
-    result = fly("px4", command, "--log", tmp_path / "flight.mcap", *sets)
+    result = fly("px4", command, "--log", tmp_path / "flight.mcap", *FURTHER)
     assert "Landed" in result.stdout
     assert set(KINDS) <= set((tmp_path / "received.txt").read_text().splitlines())
 
@@ -146,19 +157,23 @@ def test_own_autopilot_rejects_a_second_receiver():
 
 
 @pytest.mark.long
-@pytest.mark.parametrize("further", [[], FURTHER], ids=["plain", "further sensors"])
 @pytest.mark.skipif("PX4" not in os.environ, reason="PX4 names no px4 program")
-def test_px4_flies_its_square(tmp_path, further):
+@pytest.mark.parametrize("vehicle", [(), HEXACOPTER, FURTHER], ids=["quadrotor", "hexacopter", "further sensors"])
+def test_px4_flies_its_square(tmp_path, vehicle):
     log, binary = tmp_path / "flight.mcap", Path(os.environ["PX4"]).resolve()
-    sets = [text for pair in further for text in ("--set", pair)]
     command = [str(binary), "-d", str(binary.parents[1] / "etc")]
     environment = 'autopilot.environment={PX4_SIM_MODEL = "none_iris"}'
     links = "autopilot.instance=8"  # missions go to instances 0 to 9 only
-    result = fly("px4", command, "--log", log, "--set", environment, "--set", links, *sets)
+    result = fly("px4", command, "--log", log, "--set", environment, "--set", links, *vehicle)
     assert "Landed" in result.stdout
     with LogReader(log) as reader:
         assert "skew 0 ms" in reader.metadata["firmware"]
-    assert abs(lag_of_estimate(tmp_path / "flight.px4.ulg", log)) < (0.03 if further else 0.02)  # steps of 0.02 s
+    assert abs(lag_of_estimate(tmp_path / "flight.px4.ulg", log)) < (
+        0.03 if vehicle is FURTHER else 0.02
+    )  # steps of 0.02 s
+    lapwing("validate", "px4_quad", tmp_path / "flight.px4.ulg", *vehicle, "--json", tmp_path / "errors.json")
+    (flight,) = json.loads((tmp_path / "errors.json").read_text())["flights"].values()
+    assert flight["thrust_ratio"] == pytest.approx(1.0, abs=0.02)
 
 
 def lag_of_estimate(ulog, log):

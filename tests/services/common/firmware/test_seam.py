@@ -1,4 +1,4 @@
-"""Common parts of firmware adapters: motor order, volts, time-outs, playback of recorded commands."""
+"""Common parts of firmware adapters: volts, time-outs, playback of recorded commands."""
 
 import json
 import math
@@ -15,45 +15,19 @@ from lapwing.cosim.diagram.block_diagram import Service
 from lapwing.cosim.diagram.compiled_block import InputSample
 from lapwing.cosim.log import LogReader
 from lapwing.cosim.processes.patience import Patience
-from lapwing.dynamics.config_error import ConfigError
 from lapwing.runs.resimulate import resimulate
 from lapwing.runs.single_process_run import fly_single
 from lapwing.services.betaflight import link as betaflight
 from lapwing.services.common.firmware import hold
 from lapwing.services.common.firmware.hold import FirmwareCommand, HeldState, Hold
 from lapwing.services.common.firmware.link import FirmwareOutput, LinkReport
-from lapwing.services.common.firmware.motor_order import QUADROTOR_X, Output, motor_order
 from lapwing.services.common.firmware.program import FirmwareError, Program
 from lapwing.services.common.firmware.service import firmware_service
 from lapwing.services.common.ports import BatteryReading, Setpoint
-from lapwing.services.common.schemas.vehicle_schema import airframe
 from lapwing.services.scene_resolver import load, resolve
 from tests.participants import running
 
 QUAD = ["run.duration=1.0", "run.real_time_factor=1000.0"]
-
-
-def frame(*overrides):
-    return airframe(load("betaflight_quad", overrides))
-
-
-def test_each_rotor_gets_output_of_its_quarter():
-    rotors = frame().rotors
-    for k, i in enumerate(motor_order(frame(), QUADROTOR_X, "betaflight")):
-        x, y, _ = rotors.position[k]
-        assert (x > 0.0, y > 0.0) == (QUADROTOR_X[i].forward > 0.0, QUADROTOR_X[i].left > 0.0)
-        assert rotors.spin_direction[k] == QUADROTOR_X[i].spin
-
-
-def test_wrong_spin_direction_is_rejected():
-    wrong = tuple(Output(o.forward, o.left, "cw" if o.spin == "ccw" else "ccw") for o in QUADROTOR_X)
-    with pytest.raises(ConfigError, match=r"rotor 1 turns cw, output 3 of betaflight expects ccw"):
-        motor_order(frame(), wrong, "betaflight")
-
-
-def test_wrong_number_of_rotors_is_rejected():
-    with pytest.raises(ConfigError, match="betaflight drives 3 rotors, the airframe has 4"):
-        motor_order(frame(), QUADROTOR_X[:3], "betaflight")
 
 
 def test_output_is_fraction_of_battery_voltage():
