@@ -168,9 +168,8 @@ def test_px4_flies_its_square(tmp_path, vehicle):
     assert "Landed" in result.stdout
     with LogReader(log) as reader:
         assert "skew 0 ms" in reader.metadata["firmware"]
-    assert abs(lag_of_estimate(tmp_path / "flight.px4.ulg", log)) < (
-        0.03 if vehicle is FURTHER else 0.02
-    )  # steps of 0.02 s
+    largest = 0.03 if vehicle is FURTHER else 0.02  # [s] it has steps of 0.02
+    assert abs(lag_of_estimate(tmp_path / "flight.px4.ulg", log)) < largest
     lapwing("validate", "px4_quad", tmp_path / "flight.px4.ulg", *vehicle, "--json", tmp_path / "errors.json")
     (flight,) = json.loads((tmp_path / "errors.json").read_text())["flights"].values()
     assert flight["thrust_ratio"] == pytest.approx(1.0, abs=0.02)
