@@ -32,9 +32,9 @@ from lapwing.services.common.firmware.link import Read
 from lapwing.services.common.firmware.mavlink_link import MavlinkLink
 from lapwing.services.common.firmware.mavlink_transport import TcpTransport
 from lapwing.services.common.firmware.mission_client import MissionClient
-from lapwing.services.common.firmware.parameter_client import parameters_in
 from lapwing.services.common.firmware.program import TCP, UDP, OwnPort
 from lapwing.services.common.firmware.repeatable import Turns
+from lapwing.services.common.firmware.schema import parameters_in
 from lapwing.services.common.firmware.service import firmware_service
 from lapwing.services.common.ports import AirspeedReading, DistanceReading, ImuReading
 

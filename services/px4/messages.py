@@ -28,9 +28,9 @@ from lapwing.services.common.ports import (
     OpticalFlowReading,
     TrueState,
 )
+from lapwing.services.px4.schema import RC
 from lapwing.services.px4.sensor_frame import ACCELEROMETER, GYRO, MAGNETOMETER, TEMPERATURE
 
-RC = "rc"  # in place of a port
 LOCK_STEP = 1  # flag of HIL_ACTUATOR_CONTROLS
 ARMED = 128  # mode of HIL_ACTUATOR_CONTROLS
 FIX_TYPES = {0: 3, GPS_SINGLE: 3, GPS_SBAS: 4, GPS_FLOAT: 5, GPS_RTK: 6}  # GPS_FIX_TYPE by kind of fix

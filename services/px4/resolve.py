@@ -19,8 +19,7 @@ from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.common.schemas.communication_schema import ticks
 from lapwing.services.common.schemas.environment_schema import environment
 from lapwing.services.common.schemas.vehicle_schema import gravity, start_height, start_pose
-from lapwing.services.px4.messages import RC
-from lapwing.services.px4.schema import Px4
+from lapwing.services.px4.schema import RC, Px4
 
 __all__ = ["fleet", "resolve"]
 NAME = "px4"

@@ -8,6 +8,7 @@ from pydantic import Field, field_validator
 
 from lapwing.services.common.firmware.mission import MissionKeys
 
+RC = "rc"  # in place of a port
 RcRow = Annotated[list[Annotated[float, Ge(0), Le(1e5)]], Len(2, 18)]
 
 

@@ -8,7 +8,7 @@ from lapwing.services.common.firmware.firmware_config import FirmwareConfig
 from lapwing.services.common.firmware.link import FirmwareOutput, ProgramLink, Read
 from lapwing.services.common.firmware.mavlink_transport import Transport
 from lapwing.services.common.firmware.mission_client import Conventions, MissionClient, poll_flight
-from lapwing.services.common.firmware.parameter_client import parameters_in
+from lapwing.services.common.firmware.schema import parameters_in
 from lapwing.services.common.mavlink.dialect import mavlink
 from lapwing.services.common.mavlink.mission_export import to_mavlink
 

@@ -7,8 +7,7 @@ from lapwing.cosim.scene import Scene
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.vehicles.airframe import Airframe
 from lapwing.kernels import math
-from lapwing.services.common.firmware.parameter_client import parameters_in
-from lapwing.services.common.firmware.schema import TABLE, firmware_of
+from lapwing.services.common.firmware.schema import TABLE, firmware_of, parameters_in
 from lapwing.services.common.schemas.vehicle_schema import airframe
 
 

@@ -3,7 +3,6 @@
 Source: MAVLink guide, "Parameter Protocol".
 """
 
-import re
 import struct
 from collections.abc import Collection, Mapping
 from typing import Any
@@ -21,13 +20,6 @@ INTEGERS = {  # `struct` format by MAV_PARAM_TYPE
 RETRY = 1.0  # [s] until an unanswered request is sent again
 TRIES = 5  # requests after which a parameter is unknown, or keeps its value
 AT_ONCE = 5  # most requests in one poll
-_LINE = re.compile(r"(?:\d+\s+\d+\s+)?([A-Za-z]\w*)[\s,=]+([-+.\deE]+)")  # of ArduPilot, and of QGroundControl
-
-
-def parameters_in(text: str) -> dict[str, float]:
-    """Return the parameters in a file of a ground station: lines "NAME VALUE" or "1 1 NAME VALUE TYPE"."""
-    found = (_LINE.match(line.strip()) for line in text.splitlines())
-    return {match[1]: float(match[2]) for match in found if match}
 
 
 class ParameterClient:

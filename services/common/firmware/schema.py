@@ -1,5 +1,6 @@
 """Keys of `[autopilot]` that choose a foreign firmware."""
 
+import re
 from typing import Any, Literal
 
 from pydantic import Field
@@ -11,6 +12,7 @@ from lapwing.dynamics.config_error import ConfigError
 OWN = "lapwing"
 FIRMWARES = ("px4", "ardupilot", "betaflight")
 TABLE = "autopilot"
+_LINE = re.compile(r"(?:\d+\s+\d+\s+)?([A-Za-z]\w*)[\s,=]+([-+.\deE]+)")  # of ArduPilot, and of QGroundControl
 
 
 class FirmwareKeys(SceneTable):
@@ -65,3 +67,9 @@ def require_program(scene: Scene) -> None:
     if flown_by_firmware(scene) and not scene.section(TABLE).command:
         fault = f"each flight starts {firmware_of(scene)}; expected the program and its arguments, a list of texts"
         raise ValueError(f"{scene.path}: {TABLE}.command: {fault}")
+
+
+def parameters_in(text: str) -> dict[str, float]:
+    """Return the parameters in a file of a ground station: lines "NAME VALUE" or "1 1 NAME VALUE TYPE"."""
+    found = (_LINE.match(line.strip()) for line in text.splitlines())
+    return {match[1]: float(match[2]) for match in found if match}

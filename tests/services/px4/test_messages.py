@@ -21,7 +21,8 @@ from lapwing.services.common.ports import (
     OpticalFlowReading,
     TrueState,
 )
-from lapwing.services.px4.messages import RC, distance_message, gps_message, rare_messages, truth_message
+from lapwing.services.px4.messages import distance_message, gps_message, rare_messages, truth_message
+from lapwing.services.px4.schema import RC
 from lapwing.services.px4.sensor_frame import Sensors, frame, pressure_altitude, read_controls, sensor_frame
 
 

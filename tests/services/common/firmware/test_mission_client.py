@@ -11,8 +11,8 @@ from lapwing.messages import MissionItem, Vector3
 from lapwing.services.ardupilot import modes as ardupilot
 from lapwing.services.common.firmware.link import LinkReport
 from lapwing.services.common.firmware.mission_client import REJECTIONS, MissionClient, Stage, poll_flight
-from lapwing.services.common.firmware.parameter_client import parameters_in
 from lapwing.services.common.firmware.program import FirmwareError
+from lapwing.services.common.firmware.schema import parameters_in
 from lapwing.services.common.mavlink.geo_coordinates import Datum
 from lapwing.services.common.mavlink.mission_export import to_mavlink
 from lapwing.services.px4 import modes as px4
