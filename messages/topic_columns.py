@@ -5,7 +5,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lapwing.messages.cdr_arrays import number_fields, record_dtype, unknown_field
+from lapwing.messages.cdr_arrays import number_fields, record_dtype
 from lapwing.messages.cdr_layout import ENCAPSULATION, Layout
 
 Column = np.ndarray | list[Any]
@@ -29,7 +29,7 @@ class TopicColumns(Mapping[str, Column]):
     - A string: list of n str. A sequence of strings: list of n tuples.
     - An element of a sequence has its number in the name: "pose.0.position".
 
-    A field that some messages lack, for example "pose.2" if some have two poses, has no column and raises KeyError.
+    A field that some messages lack, for example "pose.2" if some have two poses, has no column.
     """
 
     def __init__(self, message: Any, groups: Sequence[_Group]) -> None:
@@ -45,13 +45,13 @@ class TopicColumns(Mapping[str, Column]):
         """Return a column.
 
         Raises:
-            KeyError: the field is unknown, or not in every message.
-            ValueError: a string is not UTF-8.
+            KeyError: the field is unknown.
+            ValueError: it is not in every message, or a string is not UTF-8.
         """
         if name in self._partial:
-            raise KeyError(f"{self.message.type_name}: field {name} is not in every message")
+            raise ValueError(f"{self.message.type_name}: field {name} is not in every message")
         if name not in self._names:
-            raise KeyError(f"{self.message.type_name}: {unknown_field(name, tuple(self._names))}")
+            raise KeyError(name)
         if name in number_fields(self._groups[0].records.dtype):
             return self._numbers(name)
         texts: list[Any] = [None] * self.count

@@ -138,6 +138,8 @@ def _type(schema: dict[str, Any], node: dict[str, Any]) -> str:
     if node.get("type") == "array":
         return f"list of {_type(schema, node['items'])}" if isinstance(node.get("items"), dict) else "list"
     kind = node.get("type", "any")
+    if kind == "object":
+        return "table" if node.get("properties") or node.get("additionalProperties", True) else "no keys"
     return " or ".join(kind) if isinstance(kind, list) else kind
 
 

@@ -65,6 +65,7 @@ class Flight(FlightData):
 
     Attributes:
         vehicle: name of the vehicle.
+        drawn: values of the varied keys of a `campaign`, {"vehicle.mass": 10.2}; {} for another flight.
         failure: reason of an early end: an invalid state, or an error in a user's controller; "" otherwise.
         origin: log or run configuration of the flight.
     """

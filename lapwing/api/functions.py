@@ -50,6 +50,7 @@ def fly(
 ) -> Flight:
     """Fly a scene in this process as fast as possible. Return the flight, which stays in memory.
 
+    A terminal or notebook shows a progress bar after 2 s, also of `campaign` and `Simulator`.
     The flight ends early if a state becomes invalid or the controller raises an error; see `outcome` and `failure`.
 
     Args:
@@ -112,7 +113,8 @@ def campaign(
 
     Returns:
         The flight of each run, in order. With the seeds 1 to n and `seed` = 1, they equal those of
-        `lapwing campaign --runs n`. `flight.config.resolved["vehicle"]["mass"]` is the drawn value of "vehicle.mass".
+        `lapwing campaign --runs n`. `flight.drawn` has the drawn values by key, so that
+        `pandas.DataFrame([flight.drawn | flight.rmse for flight in flights])` is a table with a row for each run.
 
     Raises:
         SceneError: the scene is invalid, or a drawn value does not fit it.
@@ -139,13 +141,14 @@ def campaign(
         return resolve(load_scene(base, {**campaign_plan.values(run), "run.seed": seeds[run]}))
 
     def one(run: int) -> Flight:
-        return _fly(config(run))
+        flight = _fly(config(run))
+        flight.drawn = campaign_plan.values(run)
+        return flight
 
     workers = cpu_count() or 1
     with WorkProgress(f"campaign {base.name}", len(seeds), "flights", workers) as bar:
-        first = config(0)
-        with notify_on_compile(first, bar.compiling):
-            flights = [_fly(first)]  # one flight alone, which compiles the kernels
+        with notify_on_compile(config(0), bar.compiling):
+            flights = [one(0)]  # one flight alone, which compiles the kernels
         bar.show(1)
         with ThreadPoolExecutor(workers) as pool:
             for flight in pool.map(one, range(1, len(seeds))):

@@ -5,8 +5,9 @@ from collections.abc import Iterable
 
 
 def did_you_mean(name: str, choices: Iterable[str]) -> str:
-    """Return "; did you mean X?" for the choice nearest to an unknown name, "" if none is similar."""
-    near = difflib.get_close_matches(name, list(choices), n=1)
+    """Return "; did you mean X?" for the choice nearest to an unknown name, "" if none is similar or begins with it."""
+    listed = list(choices)
+    near = difflib.get_close_matches(name, listed, n=1) or [c for c in listed if name[2:] and c.startswith(name)]
     return f"; did you mean {near[0]}?" if near else ""
 
 

@@ -60,6 +60,7 @@ class FlightData(FlightTracking):
         name: name of the flight in a comparison; "": the name of its log.
         fleet: "ground_truth" of every vehicle by name, including this one.
         others: flights of the other vehicles, with the topics for drawing and outcome.
+        drawn: values of the varied keys of a campaign.
         failure: reason of an early end; "" without one, or if the log has none.
         diverged: True if that reason is a non-finite state.
     """
@@ -68,7 +69,7 @@ class FlightData(FlightTracking):
         """Create a flight from topics by name without that of the vehicle: "ground_truth", "gps/fix", "clock"."""
         super().__init__(topics, origin)
         self.failure, self.diverged = failure, diverged
-        self.name = ""
+        self.name, self.drawn = "", dict[str, Any]()
         self.fleet = {self.vehicle: self._topics["ground_truth"]} if "ground_truth" in self._topics else {}
         self.others: tuple[FlightData, ...] = ()
 

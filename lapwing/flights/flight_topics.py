@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from lapwing.cosim.config.run_config import RunConfig
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.flights import tracking
 from lapwing.flights.flight_provenance import Origin
 from lapwing.flights.topic_view import TopicView
@@ -54,27 +55,27 @@ class FlightTopics:
                     digest.update(topic.key(self.vehicle), time_ns, payload)
         return digest.hexdigest()
 
-    @property
+    @cached_property
     def truth(self) -> TopicView:
         """True state: position, orientation, velocity, angular_velocity, acceleration, rotor_speed, wind, ..."""
         return self.topic("ground_truth")
 
-    @property
+    @cached_property
     def setpoint(self) -> TopicView:
         """Setpoint that the autopilot follows: position, velocity, acceleration, yaw, phase."""
         return self.topic("setpoint")
 
-    @property
+    @cached_property
     def actuators(self) -> TopicView:
         """Commands of the autopilot: motor_voltage [V], thrust [N], attitude_reference [rad], armed."""
         return self.topic("actuators")
 
-    @property
+    @cached_property
     def estimate(self) -> TopicView:
         """State estimate and its standard deviations: position, position_std, velocity, ..."""
         return self.topic("estimate")
 
-    @property
+    @cached_property
     def status(self) -> TopicView:
         """Status of the autopilot: phase, armed, landed, finished, warnings."""
         return self.topic("status")
@@ -91,7 +92,7 @@ class FlightTopics:
             ValueError: the topic does not exist; the message lists the topics.
         """
         if name not in self._topics:
-            raise ValueError(f"{self.origin.source}: no topic {name}; expected one of {', '.join(self.topics)}")
+            raise ValueError(str(ConfigError.unknown(self.origin.source, "topic", name, self.topics)))
         return self._topics[name]
 
     def has(self, topic: str) -> bool:
@@ -103,11 +104,10 @@ class FlightTopics:
         return self.topic(topic).times
 
     def column(self, topic: str, field: str) -> np.ndarray:
-        """Return a field of a topic by its dotted name, "pose.position" or "thrust", shape (n,) or (n, k).
+        """Return a field of a topic by its name, "position", "pose.position.x" or "thrust", shape (n,) or (n, k).
 
         Raises:
-            ValueError: the topic does not exist.
-            KeyError: not all messages have this field.
+            ValueError: the topic does not exist, or not all messages have this field.
         """
         return self.topic(topic)[field]
 

@@ -6,15 +6,19 @@ from typing import Any
 
 import numpy as np
 
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.flights import tracking
 from lapwing.messages.types import DEFINITIONS
+
+OF_POSE = {"position": "position", "orientation": "orientation", "attitude": "orientation"}  # source of each attribute
 
 
 class TopicView:
     """View of the n messages of a topic: every field is an attribute, an array whose first axis is time.
 
     `truth.velocity` has shape (n, 3), `actuators.motor_voltage` (n, 4), `setpoint.yaw` (n,), `setpoint.phase` (n,) of
-    str. `view["pose.position.x"]` is any field by its dotted name. Where the message has a pose, or one for each of k
+    str. `view["pose.position.x"]` is any field by its dotted name; an unknown one raises a ValueError, or as an
+    attribute an AttributeError, of one line that names the nearest. Where the message has a pose, or one for each of k
     bodies, `position` [m] and `orientation` (x, y, z, w) are those of the pose, shape (n, 3) or (n, k, 3).
     """
 
@@ -79,14 +83,19 @@ class TopicView:
         return result
 
     def __getitem__(self, name: str) -> np.ndarray:
-        """Return a field by its dotted name; str, or tuples of str, as objects.
+        """Return a field by its dotted name, or an attribute; str, or tuples of str, as objects.
 
         Raises:
-            KeyError: not all messages have this field.
+            ValueError: there is no such field, or not all messages have it.
         """
         if name in self._texts:
             return self._texts[name]
-        column = self._columns[name]
+        try:
+            column = self._columns[name]
+        except KeyError:
+            if name in self._derived:
+                return getattr(self, name)
+            raise ValueError(self._unknown(name)) from None
         if isinstance(column, np.ndarray):
             return column
         if any(isinstance(value, tuple) for value in column):
@@ -100,13 +109,13 @@ class TopicView:
     def __getattr__(self, name: str) -> np.ndarray:
         if name.startswith("_"):
             raise AttributeError(name)
-        try:
-            return self[name]
-        except KeyError as error:
-            raise AttributeError(error.args[0]) from None
+        if name not in self._columns:
+            raise AttributeError(self._unknown(name))
+        return self[name]
 
     def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *(name for name in self._columns if "." not in name)]
+        own = set(super().__dir__()) - OF_POSE.keys() | self._derived
+        return [*own, *(name for name in self._columns if "." not in name)]
 
     def __repr__(self) -> str:
         """Return the number of the messages and their definition, whose comments state frames and units."""
@@ -117,10 +126,25 @@ class TopicView:
     def __len__(self) -> int:
         return len(self._times_ns)
 
+    @property
+    def _derived(self) -> set[str]:
+        """Attributes that are read like fields."""
+        return {"times", *(name for name, source in OF_POSE.items() if self._pose_field(source))}
+
+    def _pose_field(self, name: str) -> str:
+        """Return the field that has the position or orientation, "" if there is none."""
+        return next((field for field in (name, f"pose.{name}", "pose") if field in self._columns), "")
+
     def _of_pose(self, name: str, part: slice) -> np.ndarray:
-        for candidate in (name, f"pose.{name}"):
-            if candidate in self._columns:
-                return self[candidate]
-        if "pose" not in self._columns:
+        field = self._pose_field(name)
+        if not field:
             raise AttributeError(name)
-        return self["pose"][..., part]
+        return self[field][..., part] if field == "pose" else self[field]
+
+    def _unknown(self, name: str) -> str:
+        """Return the error text of an unknown field; it lists the fields beside it, or the attributes."""
+        table = str(name).rpartition(".")[0]
+        beside = [field for field in self._columns if table and field.rpartition(".")[0] == table]
+        own = {field for field in self._columns if "." not in field} - {"pose"}  # its parts are named instead
+        message = getattr(getattr(self._columns, "message", None), "type_name", "")
+        return str(ConfigError.unknown(message, "field", name, beside or own | self._derived))

@@ -55,7 +55,7 @@ def test_log_and_memory_flight_are_equal(recorded, in_memory):
 def test_only_requested_topics_are_kept(run):
     result = fly(run, (TRUTH, SETPOINT))
     assert result.topics == ["ground_truth", "setpoint"]
-    with pytest.raises(ValueError, match="hover: no topic status; expected one of ground_truth, setpoint"):
+    with pytest.raises(ValueError, match="hover: unknown topic 'status'; expected one of ground_truth, setpoint"):
         result.status  # noqa: B018
 
 

@@ -1,6 +1,7 @@
 """Topics of a flight, recorded and live."""
 
 import itertools
+import re
 import sys
 
 import numpy as np
@@ -40,10 +41,35 @@ def test_fields_are_attributes(in_memory):
     assert setpoint.phase[0] == "climb"
     assert {"velocity", "rotor_speed"} <= set(dir(truth))
     assert truth.stamps == pytest.approx(truth.times)
-    with pytest.raises(AttributeError, match="no field speed"):
-        truth.speed  # noqa: B018
-    with pytest.raises(AttributeError, match="no field position"):
+    assert np.array_equal(truth["position"], truth.position)
+    assert not {"position", "attitude"} & set(dir(in_memory.status))
+
+
+@pytest.mark.parametrize(
+    ("name", "error"),
+    [
+        ("pos", "VehicleState: unknown field 'pos'; did you mean position? expected one of acceleration, "),
+        ("speed", "VehicleState: unknown field 'speed'; did you mean rotor_speed? expected one of acceleration, "),
+        ("pose.position.q", "; did you mean pose.position.z? expected one of pose.position.x, pose.position.y, pose."),
+    ],
+)
+def test_unknown_field_or_topic_names_the_nearest(in_memory, name, error):
+    for kind, read in (
+        (ValueError, lambda: in_memory.truth[name]),
+        (ValueError, lambda: in_memory.column("ground_truth", name)),
+        (AttributeError, lambda: getattr(in_memory.truth, name)),
+    ):
+        with pytest.raises(kind, match=re.escape(error)):
+            read()
+    with pytest.raises(AttributeError, match="Status: unknown field 'position'; expected one of armed, "):
         in_memory.status.position  # noqa: B018
+    with pytest.raises(ValueError, match=r"topic 'ground_truht'; did you mean ground_truth\? expected one of act"):
+        in_memory.column("ground_truht", "position")
+
+
+def test_prompt_completes_fields_of_topic_without_reading_a_property(in_memory):
+    completer = pytest.importorskip("IPython.core.completer").IPCompleter(namespace={"flight": in_memory})
+    assert [name.rpartition(".")[2] for name in completer.attr_matches("flight.truth.rotor_s")] == ["rotor_speed"]
 
 
 def test_poses_of_several_bodies():

@@ -188,8 +188,9 @@ def test_constructor_without_arguments_is_error_of_controller():
         lapwing.fly("hover", controller=type("Bare", (), {"rate": 250.0, "step": Faulty.step}))
 
 
-def test_drawn_value_is_in_configuration_of_its_flight():
+def test_flight_of_campaign_has_drawn_values():
     (flight,) = lapwing.campaign("hover", [1], {"vehicle.mass": lapwing.choice(10.2)}, {"run.duration": 0.1})
+    assert flight.drawn == {"vehicle.mass": 10.2}
     assert flight.config.resolved["vehicle"]["mass"] == 10.2
 
 

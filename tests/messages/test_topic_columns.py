@@ -62,9 +62,9 @@ def test_field_missing_in_message_has_no_column():
     columns = history(RotorWrench, [message.encode() for message in messages])
     assert "moment.0" in columns
     assert "moment.1" not in columns
-    with pytest.raises(KeyError, match=r"RotorWrench: field moment.1 is not in every message"):
+    with pytest.raises(ValueError, match=r"RotorWrench: field moment.1 is not in every message"):
         columns["moment.1"]
-    with pytest.raises(KeyError, match="RotorWrench: no field momnt; near it: moment"):
+    with pytest.raises(KeyError, match="momnt"):
         columns["momnt"]
 
 
