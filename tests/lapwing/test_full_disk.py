@@ -26,10 +26,19 @@ main()
 """
 
 
-def run(folder, size, mode):
+def run(folder, size, mode, *options):
     code = textwrap.dedent(RUN).replace("BYTES", str(size))
-    command = [sys.executable, "-c", code, str(SCENE), "--mode", mode]
+    command = [sys.executable, "-c", code, str(SCENE), "--mode", mode, *options]
     return subprocess.run(command, capture_output=True, text=True, cwd=folder)
+
+
+@pytest.mark.parametrize("size", [150_000, 160_000, 170_000])
+def test_small_chunks_leave_room_for_the_end_of_the_log(tmp_path, size):
+    done = run(tmp_path, size, "single-process", "--speed", "1")  # a chunk for each quarter of a second
+    assert "cannot write the log: File too large" in done.stderr
+    with LogReader(tmp_path / "full.mcap") as log:
+        assert log.complete
+        assert log.digest() == log.metadata["digest"]
 
 
 @pytest.mark.parametrize("mode", ["single-process", "multi-process"])

@@ -1,6 +1,9 @@
 """Writer of MCAP files: records in order, and the index at the end."""
 
+import errno
 import mimetypes
+import os
+import resource
 import zlib
 from collections.abc import Sequence
 from contextlib import suppress
@@ -37,6 +40,7 @@ METADATA_END = "lapwing_end"  # name of the metadata record at the end, with ent
 DETERMINISTIC = "deterministic"  # key in a channel's metadata: "true" or "false"
 COMPRESSION_LEVEL = 2  # zstd: the default level 3 gives larger logs; level 9 saves 3 % for five times the work
 SMALL = 1024  # [bytes] size below which messages are not compressed
+END = 1 << 15  # [bytes] more than metadata, statistics and footer at the end need
 _CRC = 4  # [bytes] size of the footer's checksum, which does not cover these bytes
 
 
@@ -73,6 +77,7 @@ class Container:
         self._attachments: list[AttachmentIndex] = []
         self._metadata: list[MetadataIndex] = []
         self._counts: dict[int, int] = {}  # messages by channel
+        self._declared = 0  # [bytes] of all schemas and channels
 
     def add_attachment(self, name: str, data: bytes) -> None:
         """Write an attachment; its media type follows from the file name."""
@@ -136,9 +141,10 @@ class Container:
             message_index_offsets=index_offsets,
             message_index_length=len(record) - length,
         )
-        before = self._chunks.extent
+        before, self._declared = self._chunks.extent, self._declared + len(head)
         self._chunks.add(encode(index), messages.start_ns, messages.end_ns)
         try:
+            self._require_room(len(record))
             self._write(record)
         except OSError:
             self._chunks.extent = before
@@ -147,6 +153,15 @@ class Container:
         self._channels += [record for record in declarations if isinstance(record, Channel)]
         for entry in messages.indexes:
             self._counts[entry.channel_id] = self._counts.get(entry.channel_id, 0) + len(entry.times_ns)
+
+    def _require_room(self, size: int) -> None:
+        """Raise OSError if the file cannot take `size` more bytes and its end, without which it would be incomplete."""
+        size += self._chunks.extent.size + self._declared + END
+        if 0 <= resource.getrlimit(resource.RLIMIT_FSIZE)[0] < self._offset + size:
+            raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
+        disk = os.fstatvfs(self._file.fileno())
+        if disk.f_bavail * disk.f_frsize < size:
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     def finish(self) -> None:
         """Write the summary and the end."""
