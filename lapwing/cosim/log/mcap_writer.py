@@ -160,7 +160,7 @@ class Container:
         if 0 <= resource.getrlimit(resource.RLIMIT_FSIZE)[0] < self._offset + size:
             raise OSError(errno.EFBIG, os.strerror(errno.EFBIG))
         disk = os.fstatvfs(self._file.fileno())
-        if disk.f_bavail * disk.f_frsize < size:
+        if disk.f_blocks and disk.f_bavail * disk.f_frsize < size:  # some file systems in memory have no size
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     def finish(self) -> None:
