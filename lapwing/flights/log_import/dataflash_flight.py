@@ -20,6 +20,7 @@ from lapwing.flights.log_import.message_columns import Columns, MessageColumns
 from lapwing.flights.log_import.recording import ELLIPSOID, SEA_LEVEL, Recording, Series, session_notes
 from lapwing.flights.log_import.source_choice import Choices
 from lapwing.services.ardupilot.servo_packet import pulse_range
+from lapwing.services.common.ports import IMUS
 
 FIRST_MOTOR, NINTH_MOTOR = 33, 82  # SERVOn_FUNCTION of motors 1 to 8, and 9 to 12
 OUTPUTS = 32  # highest number of an output
@@ -85,7 +86,7 @@ def read_dataflash_flight(path: Path, choices: Choices = Choices()) -> Recording
     offer("specific_force", every("IMU", *ACCELEROMETER, frame="FRD"))
     units = every("IMU", *GYROSCOPE, *ACCELEROMETER, frame="FRD")
     offer("imu", units)
-    for name, unit in zip(("imu2", "imu3"), units[1:], strict=False):
+    for name, unit in zip(IMUS[1:], units[1:], strict=False):
         offer(name, [replace(unit, instance=None)])
     offer("battery", (*every("BAT", "Volt", "Curr"), *every("CURR", "Volt", "Curr")))
     offer("duty", [_duty(path, messages, parameters, channels)])

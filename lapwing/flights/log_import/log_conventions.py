@@ -11,6 +11,7 @@ import numpy as np
 from lapwing.dynamics.input_file import unreadable
 from lapwing.flights.log_import.recording import Series
 from lapwing.flights.rotation_arrays import from_euler, from_ned_frd, ned_to_enu, to_euler, unit
+from lapwing.services.common.ports import IMUS
 
 FIX = 3  # GPS_FIX_TYPE of a fix in three dimensions
 PULSE_LOW, PULSE_HIGH = 1000.0, 2000.0  # [us] of motors at rest and at full throttle
@@ -52,7 +53,7 @@ def direction(orientation: float) -> str:
 FLU = np.array([1.0, -1.0, -1.0])  # signs from FRD to FLU, and back
 BODY = {
     "omega": FLU, "specific_force": FLU, "mag": FLU, "optical_flow": [1, -1, 1, -1, 1],
-    **dict.fromkeys(("imu", "imu2", "imu3"), np.tile(FLU, 2)),
+    **dict.fromkeys(IMUS, np.tile(FLU, 2)),
 }  # fmt: skip
 
 

@@ -15,6 +15,7 @@ from lapwing.flights.log_import.channels import Channels, to_recording
 from lapwing.flights.log_import.log_conventions import FIX, direction, out_of_range, parsing, shares
 from lapwing.flights.log_import.recording import ELLIPSOID, LONGEST_GAP, SEA_LEVEL, Recording, Series
 from lapwing.flights.log_import.source_choice import Choices
+from lapwing.services.common.ports import IMUS
 
 GAUSS = 1e-4  # [T]
 HIGHEST_HPA = 2000.0  # pressures below are in hPa
@@ -259,7 +260,7 @@ def _offer_readings(channels: Channels, topics: _Topics) -> None:
 
     raw = [f"{name}[{k}]" for name in ("gyro_rad", "accelerometer_m_s2") for k in range(3)]
     offer("imu", every("sensor_combined", *raw, frame="FRD"))
-    for name, unit in zip(("imu2", "imu3"), _further_imus(topics), strict=False):
+    for name, unit in zip(IMUS[1:], _further_imus(topics), strict=False):
         offer(name, [unit])
     for topic in ("vehicle_gps_position", "sensor_gps"):  # degrees and metres were integers until PX4 1.14
         for height, datum in (("ellipsoid", ELLIPSOID), ("msl", SEA_LEVEL)):

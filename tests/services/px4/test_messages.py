@@ -61,7 +61,7 @@ def received(port, reading, flow_interval=0.02, rc=()):
     return message and mavlink.MAVLink(None).parse_buffer(packed(message))[0]
 
 
-def test_flow_of_flight_forwards_and_to_the_right_has_the_signs_of_mavlink():
+def test_optical_flow_has_the_signs_of_mavlink():
     """Motion along FRD y gives a negative flow about x, along x a positive one about y; a turn its rate."""
     forward, right, height = 2.0, 0.5, 4.0
     moving = OpticalFlowReading((-right / height, -forward / height), distance=height, valid=True)

@@ -82,7 +82,7 @@ def test_command_of_roll_pitch_and_yaw_produces_this_torque(firmware, vehicle):
         assert np.abs(np.delete(frd, axis)).max() < 0.3 * frd[axis]  # the arms of quad_x differ
 
 
-def test_parameters_of_scene_may_number_the_rotors_of_px4_in_another_order():
+def test_px4_rotor_order_follows_parameters_of_scene():
     order, p = motors(load("px4_quad", HEXACOPTER))
     assert order == tuple(range(6))
     other = {f"CA_ROTOR{k}_{end}": p[f"CA_ROTOR{5 - k}_{end}"] for k in range(6) for end in ("PX", "PY", "KM")}
