@@ -8,23 +8,20 @@ def main() -> None:
     try:
         from lapwing.cosim.processes.interrupt import (
             Interrupted,
-            interrupt_behind,
+            interrupts_first,
             raise_on_interrupt,
             report_interrupt,
         )
 
         try:
             raise_on_interrupt()
-            prepare_streams()
-            from lapwing.cli.main import main as carry_out
+            with interrupts_first():
+                prepare_streams()
+                from lapwing.cli.main import main as carry_out
 
-            carry_out()
+                carry_out()
         except Interrupted as interrupted:
             raise SystemExit(report_interrupt(interrupted)) from None
-        except Exception as error:  # an interrupt that Python has wrapped; all other errors are raised again
-            if (cause := interrupt_behind(error)) is None:
-                raise
-            raise SystemExit(report_interrupt(cause)) from None
     except KeyboardInterrupt:  # Python raises it for SIGINT before `raise_on_interrupt`
         from lapwing.cosim.processes.interrupt import SIGINT, Interrupted, report_interrupt
 

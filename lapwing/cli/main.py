@@ -89,7 +89,9 @@ def options(
 
 def main() -> None:
     """Run the command of the command line."""
-    with user_errors(), check_output():
+    from lapwing.cosim.processes.interrupt import interrupts_first
+
+    with user_errors(), interrupts_first(), check_output():
         _check_working_directory()
         _check_encoding()
         _check_open_files()

@@ -95,6 +95,30 @@ def test_interrupt_in_class_definition_has_line_and_exit_code():
     assert (done.returncode, done.stdout, done.stderr) == (130, "", "lapwing: ended by SIGINT\n")
 
 
+LOST = """
+import ctypes, os, signal, sys
+from lapwing.cli import entry_point, main
+
+@ctypes.CFUNCTYPE(None)
+def notify():  # called by the compiler's library, which loses exceptions
+    os.kill(os.getpid(), signal.SIGTERM)
+
+def compile(*arguments, **options):
+    notify()
+    raise ERROR("no compiled object yet")
+
+main.app = compile
+entry_point.main()
+"""
+
+
+@pytest.mark.parametrize("error", ["RuntimeError", "ValueError"])
+def test_error_after_a_lost_interrupt_is_the_interrupt(error):
+    code = LOST.replace("ERROR", error)
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (143, "", "lapwing: ended by SIGTERM\n")
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("mode", ["single-process", "multi-process"])
 def test_ctrl_c_in_flight_has_equal_text_in_both_modes(tmp_path, mode):

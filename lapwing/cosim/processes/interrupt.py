@@ -2,8 +2,8 @@
 
 import signal
 import sys
-from collections.abc import Callable
-from contextlib import suppress
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, suppress
 from signal import SIGHUP, SIGINT, SIGTERM
 
 from lapwing.cosim.processes.patience import Patience
@@ -22,15 +22,22 @@ class Interrupted(BaseException):
         self.signal = number
 
 
-def interrupt_behind(error: BaseException) -> Interrupted | None:
-    """Return the interrupt that caused an error, or None.
+_raised: Interrupted | None = None  # the first that `raise_on_interrupt` has raised
 
-    Python 3.11 raises RuntimeError from an exception in `__set_name__`, which every dataclass calls at its definition.
+
+@contextmanager
+def interrupts_first() -> Iterator[None]:
+    """Raise the interrupt instead of an error that follows from it.
+
+    An interrupt that is lost in the compiler's library leaves objects unfinished, whose later use fails. Python 3.11
+    raises RuntimeError from an exception in `__set_name__`, which every dataclass calls at its definition.
     """
-    cause: BaseException | None = error
-    while cause is not None and not isinstance(cause, Interrupted):
-        cause = cause.__cause__ or cause.__context__
-    return cause
+    try:
+        yield
+    except Exception:
+        if _raised is None:
+            raise
+        raise _raised from None
 
 
 class Stop:
@@ -81,11 +88,9 @@ class Stop:
 def raise_on_interrupt() -> None:
     """Let the signals of `ENDING` raise `Interrupted` immediately; a run uses `Stop` instead."""
 
-    raised = False
-
     def raise_(number: int, _: object) -> None:
-        nonlocal raised
-        raised = True
+        global _raised
+        _raised = _raised or Interrupted(number)
         # An exception that is raised inside a call from the compiler's library is lost there: raise it again, later.
         signal.signal(signal.SIGALRM, lambda *_: raise_(number, None))
         signal.setitimer(signal.ITIMER_REAL, REPEAT_DELAY)
@@ -93,7 +98,7 @@ def raise_on_interrupt() -> None:
 
     def report_unraisable(unraisable: "sys.UnraisableHookArgs") -> None:
         # An interrupt leaves objects whose constructor has not finished; their `__del__` may fail.
-        if not raised:
+        if _raised is None:
             sys.__unraisablehook__(unraisable)
 
     sys.unraisablehook = report_unraisable
