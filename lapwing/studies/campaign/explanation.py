@@ -10,7 +10,7 @@ from lapwing.studies.campaign.folder import read
 from lapwing.studies.campaign.plan import SEED, Plan
 from lapwing.studies.campaign.results import Results
 from lapwing.studies.campaign.runs import Row, row_of, scene_of
-from lapwing.studies.campaign.single_run import plan_of
+from lapwing.studies.campaign.single_run import plan_of, recorded_row
 from lapwing.studies.campaign.verdict import drivers, subject, unmet
 
 HALVINGS = 7  # of the interval between the value of the scene and the drawn one
@@ -66,10 +66,9 @@ def explain(folder: Path, run: int, progress: Callable[[str, int, int], None] = 
         return flown[key]
 
     kept = plan.values(run)
-    original = fly(kept)
-    missed = unmet(texts, original["outcome_text"])
-    if not missed:
-        raise ValueError(f"--explain {run}: {original['outcome_text'] or 'the run succeeds'}; expected a failed run")
+    outcome = (recorded_row(run, folder) or fly(kept))["outcome_text"]
+    if not (missed := unmet(texts, outcome)):
+        raise ValueError(f"--explain {run}: {outcome or 'the run succeeds'}; expected a failed run")
 
     def fails(values: Mapping[str, Any]) -> bool:
         return not set(missed).isdisjoint(unmet(texts, fly(values)["outcome_text"]))
@@ -101,7 +100,7 @@ def explain(folder: Path, run: int, progress: Callable[[str, int, int], None] = 
     ]
     sets = [part for text in overrides for part in ("--set", text)]
     return Explanation(
-        run, original["outcome_text"], tuple(missed), tuple(changes),
+        run, outcome, tuple(missed), tuple(changes),
         tuple(key for key in plan.keys if key not in kept), fly(kept)["outcome_text"], len(flown),
         shlex.join(["lapwing", "run", plan.path, *sets]),
     )  # fmt: skip

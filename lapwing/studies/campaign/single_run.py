@@ -6,7 +6,7 @@ from lapwing.cosim.scene import Scene
 from lapwing.services.scene_resolver import load
 from lapwing.studies.campaign.folder import read
 from lapwing.studies.campaign.plan import Plan
-from lapwing.studies.campaign.runs import REJECTED, name_option_in_errors, scene_of, sources
+from lapwing.studies.campaign.runs import REJECTED, Row, name_option_in_errors, scene_of, sources
 
 
 def plan_of(scene: Path, run: int, folder: Path) -> Plan:
@@ -38,11 +38,16 @@ def scene_of_run(scene: Path, run: int, folder: Path) -> Scene:
         return load(scene_of(plan), plan.overrides_of(run))
 
 
-def end_state_of(run: int, folder: Path) -> str:
-    """Return the end state of a run in its campaign; "" without one."""
+def recorded_row(run: int, folder: Path) -> Row | None:
+    """Return the row of a run in the table of its campaign; None if it was not flown."""
     campaign = read(folder)
     shard = next(k for k, runs in enumerate(campaign.shards) if run in runs)
     if shard in campaign.missing():
-        return ""
-    row = next(row for row in campaign.rows(shard) if row["run"] == run)
-    return "" if row["outcome"] == REJECTED else row["end_state"]
+        return None
+    return next(row for row in campaign.rows(shard) if row["run"] == run)
+
+
+def end_state_of(run: int, folder: Path) -> str:
+    """Return the end state of a run in its campaign; "" without one."""
+    row = recorded_row(run, folder)
+    return "" if row is None or row["outcome"] == REJECTED else row["end_state"]
