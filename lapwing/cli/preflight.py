@@ -9,6 +9,7 @@ import typer
 MANY_PARTS = 8  # of a step, from which the cause is printed
 
 if TYPE_CHECKING:
+    from lapwing.cosim.config.run_config import RunConfig
     from lapwing.cosim.scene import Scene
 
 
@@ -76,6 +77,26 @@ def warn_of_split_steps(scene: "Scene") -> None:
         if (number := fastest.rate * step / FASTEST_RATE) > MANY_PARTS:
             message = f"{fastest.name} (decay within {1e3 / fastest.rate:.2g} ms) split each step of {1e3 * step:g} ms"
             typer.echo(f"lapwing: warning: solver: {message} into {number:.0f}, which costs most of the time", err=True)
+
+
+def warn_of_fence(scene: "Scene", config: "RunConfig") -> None:
+    """Print a warning for each vehicle whose trajectory leaves the scene's fence, with the first time and place."""
+    from lapwing.cosim.diagram.multi_vehicle import members
+    from lapwing.services.common.plans.fence import Fence
+    from lapwing.services.common.schemas.fence_schema import FenceTable
+    from lapwing.services.trajectory.service import NAME, TrajectoryConfig
+
+    for vehicle, member in zip(scene.each_vehicle, members(config), strict=True):
+        service = member.services.get(NAME)
+        if not vehicle.has(FenceTable) or service is None or not isinstance(service.parameters, TrajectoryConfig):
+            continue
+        fence = Fence(vehicle[FenceTable].items())
+        for time, phase, x, y in service.parameters.track(member.duration):
+            if breach := fence.breach(x, y):
+                prefix = f"{member.vehicle}: " if scene.vehicles else ""
+                message = f"x = {x:z.1f} m, y = {y:z.1f} m at t = {time:.1f} s in phase {phase!r} is {breach}"
+                typer.echo(f"lapwing: warning: {prefix}trajectory: {message}; move it or the fence", err=True)
+                break
 
 
 def check_firmware_program(scene: "Scene") -> None:

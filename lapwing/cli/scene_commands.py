@@ -9,7 +9,13 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.options import Overrides
 from lapwing.cli.output_paths import check_distinct, claim
-from lapwing.cli.preflight import check_gains, warn_of_round_off, warn_of_split_steps, with_solver_selected
+from lapwing.cli.preflight import (
+    check_gains,
+    warn_of_fence,
+    warn_of_round_off,
+    warn_of_split_steps,
+    with_solver_selected,
+)
 from lapwing.cosim.complete_file import write_text
 from lapwing.dynamics.config_error import ConfigError
 
@@ -82,6 +88,7 @@ def check(
         check_gains(loaded, force=True)
         warn_of_round_off(loaded)
         warn_of_split_steps(loaded)
+        warn_of_fence(loaded, config)
         for each in loaded.each_vehicle:
             vehicle = each[Vehicle]
             lines += [

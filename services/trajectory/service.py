@@ -1,18 +1,25 @@
 """Trajectory service: outputs setpoints, up to a bounded time ahead of the plant."""
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.diagram.block_diagram import Service
 from lapwing.cosim.diagram.compiled_block import Block
+from lapwing.kernels import math, python_function
 from lapwing.kernels.cell import Cell
 from lapwing.messages.topics import TRAJECTORY
 from lapwing.services.common import ports
 from lapwing.services.common.encoders import setpoint_encoder
+from lapwing.services.trajectory import polynomial_piece
 from lapwing.services.trajectory.block import TrajectoryPath
 from lapwing.services.trajectory.leader_follower import FollowedPath
+from lapwing.services.trajectory.polynomial_piece import Parameters
 
 NAME = "trajectory"
+TRACK_INTERVAL = 0.02  # [s]
+_channel_at = python_function(polynomial_piece.channel_at)
+_last_not_after = python_function(polynomial_piece.last_not_after)
 
 
 class TrajectoryConfig(NamedTuple):
@@ -20,6 +27,26 @@ class TrajectoryConfig(NamedTuple):
 
     core: TrajectoryPath | FollowedPath
     phases: tuple[str, ...]  # names by index
+
+    def track(self, duration: float) -> Iterator[tuple[float, str, float, float]]:
+        """Yield time [s], phase and world x, y [m], until the vehicle holds or `duration` [s] is over."""
+        core = self.core
+        paths = [core.relative.path, core.leader.path] if isinstance(core, FollowedPath) else [core.path]
+        own = paths[0]
+        duration = min(duration, max(float(c.start[-1]) for path in paths for c in (path.x, path.y, path.yaw)))
+        for sample in range(int(duration / TRACK_INTERVAL) + 2):
+            time = min(sample * TRACK_INTERVAL, duration)
+            x, y = _place(own, time)
+            if isinstance(core, FollowedPath):
+                s, c = math.sincos(_channel_at(core.leader.path.yaw, time)[0]) if core.heading else (0.0, 1.0)
+                x0, y0 = _place(core.leader.path, time)
+                x, y = x0 + c * x - s * y, y0 + s * x + c * y
+            yield time, self.phases[_last_not_after(own.phase_start, time)], x, y
+
+
+def _place(path: Parameters, time: float) -> tuple[float, float]:
+    x, y, _ = path.origin_world
+    return x + _channel_at(path.x, time)[0], y + _channel_at(path.y, time)[0]
 
 
 def create(config: RunConfig) -> Service:

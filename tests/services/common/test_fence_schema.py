@@ -80,6 +80,24 @@ def test_invalid_fence_is_one_line(override, message):
     assert_rejected(run_command("check", "quad_x", "--set", override), message)
 
 
+@pytest.mark.parametrize(
+    ("scene", "override", "warnings"),
+    [
+        ("quad_x", SQUARE, []),
+        ("quad_x", CIRCLE, ["trajectory: x = 6.0 m, y = 1.5 m at t = 11.4 s in phase 'left' is in a keep-out area"]),
+        (
+            "formation",
+            "fence.keep_out=[{position = [9.0, 0.0], radius = 1.0}]",  # the wing man is led there
+            ["wing: trajectory: x = 8.2 m, y = -0.6 m at t = 11.9 s in phase 'formation' is in a keep-out area"],
+        ),
+    ],
+)
+def test_trajectory_outside_the_fence_is_a_warning(scene, override, warnings):
+    done = run_command("check", scene, "--set", override, code=0)
+    expected = [f"lapwing: warning: {text} of the geofence; move it or the fence" for text in warnings]
+    assert done.stderr.splitlines() == expected
+
+
 def test_firmware_has_its_own_fence():
     assert_rejected(run_command("check", "px4_quad", "--set", CIRCLE), "fence: is not uploaded to px4")
 
