@@ -106,7 +106,7 @@ class RunProgress(_TerminalBar):
         elif time.monotonic() >= self._next_line:
             self._next_line = time.monotonic() + LINE_PERIOD
             factor = seconds / max(1e-9, time.monotonic() - self._started)
-            self._console.print(f"t = {seconds:6.1f} s  {factor:5.1f}x  {line}")
+            self.say(f"t = {seconds:6.1f} s  {factor:5.1f}x  {line}")
 
 
 class StudyProgress(_TerminalBar):

@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 from rich.console import Console
 
-from lapwing.cli.progress import StudyProgress, step_progress
+from lapwing.cli.progress import RunProgress, StudyProgress, step_progress
+from lapwing.messages import Status
 from lapwing.runs.work_progress import TimeLeft, WorkProgress
 
 
@@ -138,6 +139,17 @@ def test_terminal_has_bar_and_other_streams_have_lines(terminal, expected):
         if countdown._bar:
             countdown._bar.refresh()
         assert re.search(expected, console.file.getvalue())
+
+
+def test_progress_of_a_run_is_one_line_each(monkeypatch):
+    monkeypatch.setattr("lapwing.cli.progress.LINE_PERIOD", 0.0)
+    status = type("Decoded", (), {"phase": "item 5 of 7: go to 9.99 m north, 10 m east, 10 m up, by the shorter way"})
+    monkeypatch.setattr(Status, "decode", lambda _: status)
+    console = Console(file=io.StringIO(), width=80)
+    with RunProgress(console, 100.0) as progress:
+        progress.begin()
+        progress.show(0, None, b"")
+    assert console.file.getvalue().count("\n") == 1
 
 
 @pytest.mark.parametrize(("announced", "expected"), [(True, "measuring reference ...\n"), (False, "")])
