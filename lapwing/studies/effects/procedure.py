@@ -145,15 +145,15 @@ def study(
         reference = next(flights)
         if failure := reference[0].failure:
             raise ValueError(f"{scene.path}: {failure}")
-        for i, (change, changed) in enumerate(zip(valid_variants, flights, strict=True), 1):
-            report(f"{'without' if change.removed else 'with'} {change.name}", i + 1, count)
-            result[change] = influence(reference, changed)
+        for done, change in enumerate(valid_variants, 1):
+            report(f"{'without' if change.removed else 'with'} {change.name}", done, count)
+            result[change] = influence(reference, next(flights))
         distances = {name: i.trajectory for (name, removed), i in result.items() if removed and name in present}
         removable = sorted((name for name, d in distances.items() if d <= within), key=distances.__getitem__)
         smallest, distance = _smallest(
             pool, tables, reference, removable, within, lambda text: report(text, count, count + 1)
         )
-    report("measuring the plant's steps", count + 1, count + 1)
+    report("measuring the plant's steps", count, count + 1)
     full_cost, smallest_cost, *others = all_costs = costs(scene, [tables, smallest, *valid_variants.values()])
     variant_costs = dict(zip(valid_variants, others, strict=True))
     rows = []
