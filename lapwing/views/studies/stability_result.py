@@ -64,7 +64,7 @@ def _rows(each: Result) -> Rows:
 def _breaks(sweep: Sweep) -> list[str]:
     """Return for each method the difficulty at which it breaks."""
     return [
-        f"{name}: {'nowhere in the sweep' if limit is None else f'at {sweep.difficulty} = {_number(limit)}'}"
+        f"{name} {'holds in the whole sweep' if limit is None else f'breaks at {sweep.difficulty} = {_number(limit)}'}"
         for name, limit in sweep.breaks().items()
     ]
 
