@@ -232,7 +232,8 @@ def _flights(validation: Validation) -> Rows:
 def _envelope(validation: Validation) -> Plot:
     after = validation.horizons[-1] * validation.interval
     panels = []
-    all_trends = trends(validation)
+    found = trends(validation)
+    all_trends = [trend for trend in found if len(trend.centres) > 1] or found  # one point shows no trend
     shown = [name for name in SHOWN if name not in validation.missing]
     for column, trend in enumerate(all_trends):
         for row, name in enumerate(shown):
