@@ -14,6 +14,7 @@ from lapwing.flights.log_import.source_choice import Choices
 from lapwing.flights.rotation_arrays import from_xyzw
 
 MOST_EQUAL = 0.9  # largest share of rows with the time of the row before
+WHOLE = 1e-6  # largest distance of a rate [Hz] from a whole number
 
 
 def read_csv_flight(path: Path, mapping: Mapping, choices: Choices = Choices()) -> Recording:  # noqa: B008
@@ -75,8 +76,8 @@ def from_columns(
         setpoint[:, :3] = _vector(table, mapping.setpoint)
         offer("setpoint", setpoint, mapping.setpoint.columns, mapping.setpoint.frame)
     kept = time[np.r_[True, np.diff(time) > 0.0]]
-    interval = float(np.round(np.median(np.diff(kept)), 5))
-    check_density(path, kept[-1] / interval if interval > 0.0 else np.inf, len(kept))
+    interval = _interval(kept)
+    check_density(path, kept[-1] / interval, len(kept))
     flight = to_recording(path, channels, ", ".join(mapping.motors.columns), "omega", choices, interval)
     return replace(flight, name=path.name.removesuffix(".gz").removesuffix(".csv"))
 
@@ -97,6 +98,13 @@ def _time(path: Path, time: np.ndarray) -> np.ndarray:
             "its resolution is too low, check time.column in the mapping, or log a finer time"
         )
     return np.asarray(time - time[0])
+
+
+def _interval(time: np.ndarray) -> float:
+    """Return the time between two samples [s]: a second has a whole number of them, as of the ticks of a plant."""
+    median = float(np.median(np.diff(time)))
+    rounded = 1.0 / (round(median, 5) or median)  # the clock's jitter
+    return 1.0 / max(1, round(rounded if abs(rounded - round(rounded)) < WHOLE else 1.0 / median))
 
 
 def _first(mask: np.ndarray) -> int:

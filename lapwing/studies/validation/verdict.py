@@ -109,7 +109,7 @@ def facts(validation: Validation) -> list[str]:
 def _named(rows: list[Comparison]) -> str:
     times: dict[str, list[str]] = {}
     for row in rows:
-        times.setdefault(row.field.replace("_", " "), []).append(f"{row.time:g}")
+        times.setdefault(row.field.replace("_", " "), []).append(f"{row.time:.3g}")
     return "; ".join(f"{field} after {_listed(each, 'and')} s" for field, each in times.items())
 
 

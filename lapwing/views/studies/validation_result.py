@@ -61,7 +61,7 @@ def identification_result(identification: Identification) -> StudyResult:
     for key, before, value, error in zip(fit.keys, fit.start, fit.values, fit.standard_errors, strict=True):
         rows.add(key, f"{before:.5g}", f"{value:.5g}", f"{error:.2g}")
     time = after.horizons[-1] * after.interval
-    errors = Rows(f"Error after {time:g} s on {flights}", "quantity", "before", "after")
+    errors = Rows(f"Error after {time:.3g} s on {flights}", "quantity", "before", "after")
     for name, before, now in zip(FIELDS, identification.before.plant[-1], after.plant[-1], strict=True):
         if np.isfinite(now.mean):  # measured by a held-out flight
             errors.add(f"{name.replace('_', ' ')} [{UNITS[name]}]", f"{before.mean:.3g}", f"{now.mean:.3g}")
@@ -108,7 +108,7 @@ def _verdict(validation: Validation) -> Rows:
     rows = Rows(f"Error of the plant over that of the baseline, {basis(validation)}", *heads, texts=("error",))
     for c in comparisons(validation):
         ratios = (_ratio(c, name) if name in c.ratios else "-" for name in names)
-        rows.add(f"{c.time:g} s", c.field.replace("_", " "), *ratios)
+        rows.add(f"{c.time:.3g} s", c.field.replace("_", " "), *ratios)
     return rows
 
 
@@ -139,7 +139,7 @@ def error_table(validation: Validation) -> Rows:
             numbers = [metric.mean, *([metric.low, metric.high] if interval else [])]
             numbers += [baseline[k][f].mean for baseline in validation.baselines.values()]
             quantity = f"{FIELDS[f].replace('_', ' ')} [{UNITS[FIELDS[f]]}]"
-            rows.add(f"{steps * validation.interval:g}", quantity, *map(plain, numbers))
+            rows.add(f"{steps * validation.interval:.3g}", quantity, *map(plain, numbers))
     return rows
 
 
@@ -241,7 +241,7 @@ def _envelope(validation: Validation) -> Plot:
             label = f"{name} [{UNITS[name]}]" if column == 0 else ""
             low = trend.label if row == len(shown) - 1 else ""
             panels.append(Panel((line,), label, low, row=row, column=column, timed=False))
-    caption = f"Mean absolute error after {after:g} s by the state at the start of the window."
+    caption = f"Mean absolute error after {after:.3g} s by the state at the start of the window."
     return Plot(tuple(panels), caption, 2.0 * len(shown), (1.0,) * len(shown), (1.0,) * max(len(all_trends), 1))
 
 

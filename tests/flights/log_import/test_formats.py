@@ -21,6 +21,7 @@ from flight_writers import (
 from scipy.spatial.transform import Rotation
 
 from lapwing.flights.flight_data import FlightData
+from lapwing.flights.log_import import csv_flight
 from lapwing.flights.log_import.dataflash_flight import read_dataflash_flight
 from lapwing.flights.log_import.open_flight import open_flight
 from lapwing.flights.rotation_arrays import conjugate, product, rotation_vector
@@ -168,7 +169,15 @@ def test_crazyflie_log_of_real_vehicle_is_in_si_units(tmp_path):
     (tmp_path / "log10").write_bytes((real_flights("arpl_crazyflie") / "log10").read_bytes())
     result = open_flight(tmp_path / "log10")
     assert np.median(result.specific_force[:, 2]) == pytest.approx(GRAVITY, rel=0.03)
-    assert result.interval == pytest.approx(1e-3, rel=0.05)
+    rate = 1.0 / result.interval
+    assert rate == pytest.approx(round(rate)) == pytest.approx(1010, rel=0.01)  # of the ticks of a plant
+
+
+@pytest.mark.parametrize(
+    ("step", "rate"), [(0.01, 100), (0.00999, 100), (0.00099, 1010), (0.000125, 8000), (5.0, 1)]
+)
+def test_second_has_whole_number_of_rows(step, rate):
+    assert csv_flight._interval(step * np.arange(50)) == pytest.approx(1.0 / rate, rel=1e-12)
 
 
 @pytest.mark.parametrize("content", [b"", b"\xa3\x95\x80" + bytes(20)], ids=["empty", "cut"])
