@@ -224,8 +224,9 @@ def parameters(
     values = apply_commands(known, commands)
     if save:
         parameter_file.write(save, known.values(), values)
+    width = max((len(p.unit) for p in known.values()), default=0)
     for p in known.values():
-        typer.echo(f"{p.name:<16} {values[p.name]:<12.6g} {p.unit:<6} {p.least:g} to {p.most:g}: {p.meaning}")
+        typer.echo(f"{p.name:<16} {values[p.name]:<12.6g} {p.unit:<{width}} {p.least:g} to {p.most:g}: {p.meaning}")
 
 
 @app.command()

@@ -138,9 +138,12 @@ def protocol(
 
 
 def _show(name: str, service: dict[str, Any]) -> None:
+    from lapwing.views.terminal import counted
+
     typer.echo(f"\n{name}")
     for port in service["inputs"]:
-        typer.echo(f"  input {port['port']}" + (f", delayed by {port['delay']} ticks" if port["delay"] else ""))
+        delay = f", delayed by {counted(port['delay'], 'tick')}" if port["delay"] else ""
+        typer.echo(f"  input {port['port']}{delay}")
     for port in service["ports"]:
         every = "every tick" if port["period"] == 1 else f"every {port['period']} ticks"
         typer.echo(f"  output {port['name']}, {every}: {len(port['columns'])} columns")

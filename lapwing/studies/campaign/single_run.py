@@ -22,7 +22,7 @@ def plan_of(scene: Path, run: int, folder: Path) -> Plan:
     """
     campaign = read(folder)
     if not 0 <= run < campaign.plan.runs:
-        raise ValueError(f"--run {run}: expected a run of {folder}, 0 to {campaign.plan.runs - 1}")
+        raise ValueError(f"run {run}: expected a run of {folder}, 0 to {campaign.plan.runs - 1}")
     plan = campaign.plan._replace(path=str(scene))
     recorded, current = campaign.about["sources"], sources(plan)
     for name in sorted({*recorded, *current}):

@@ -173,9 +173,7 @@ def test_crazyflie_log_of_real_vehicle_is_in_si_units(tmp_path):
     assert rate == pytest.approx(round(rate)) == pytest.approx(1010, rel=0.01)  # of the ticks of a plant
 
 
-@pytest.mark.parametrize(
-    ("step", "rate"), [(0.01, 100), (0.00999, 100), (0.00099, 1010), (0.000125, 8000), (5.0, 1)]
-)
+@pytest.mark.parametrize(("step", "rate"), [(0.01, 100), (0.00999, 100), (0.00099, 1010), (0.000125, 8000), (5.0, 1)])
 def test_second_has_whole_number_of_rows(step, rate):
     assert csv_flight._interval(step * np.arange(50)) == pytest.approx(1.0 / rate, rel=1e-12)
 

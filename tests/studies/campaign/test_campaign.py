@@ -264,7 +264,8 @@ def test_report_json_and_repeated_run(complete, tmp_path, monkeypatch):
         True,
     )  # a failed run
     code, output = run_lapwing("run", SCENE, "--run", RUNS, "--campaign", folder.path)
-    assert (code, f"--run {RUNS}: expected a run of {folder.path}, 0 to 39" in output) == (2, True)
+    assert (code, f"lapwing: run {RUNS}: expected a run of {folder.path}, 0 to 39" in output) == (2, True)
+    assert run_lapwing("campaign", folder.path, "--explain", RUNS) == (code, output)
     code, output = run_lapwing("run", "hover", "--run", 1, "--campaign", folder.path)
     assert (code, "differs from the campaign" in output) == (2, True)
 
