@@ -50,7 +50,7 @@ from lapwing.services.common.schemas.vehicle_schema import Vehicle, start_place
 from lapwing.services.trajectory import phases, waypoints
 from lapwing.services.trajectory.phases import Phases
 from lapwing.services.trajectory.segments.segment import Segment
-from lapwing.services.trajectory.trajectory_compiler import CHANNELS, CompiledTrajectory, compile
+from lapwing.services.trajectory.trajectory_compiler import CHANNELS, GROUNDED, CompiledTrajectory, compile
 from lapwing.services.trajectory.waypoints import Route, Waypoint
 
 ROUTE = set(Route.model_fields)
@@ -108,8 +108,14 @@ class Trajectory(Route, Phases, SceneTable):
                         segment["points"] = parse_table(files.text(f"{key}.points", f"{key}.file", path), path)
 
     def check(self, scene: Scene) -> None:
-        """Raise ConfigError unless the segments join, phases are long enough, and a frame has a leader."""
+        """Raise ConfigError for gaps between segments, short phases, points below ground, a frame without a leader."""
         compile_trajectory(scene)
+        ground = _ground(scene)
+        for i, (x, y, z, *_) in enumerate(() if self.leader else self.waypoints):
+            if z < (height := ground(x, y)) - GROUNDED:
+                raise ConfigError(
+                    f"trajectory.waypoints.{i}", f"got {z:g} m", f"z of at least {height:.3g} m, the ground there"
+                )
         if self.frame and not self.leader:
             raise ConfigError("trajectory.frame", "has no leader", "trajectory.leader, or no frame")
 

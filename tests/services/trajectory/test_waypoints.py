@@ -81,6 +81,10 @@ def test_resolved_table_has_waypoints_and_validates_again():
         ({"waypoints": []}, "trajectory.waypoints: expected at least 1 of them"),
         ({"waypoints": [[0.0, 0.0]]}, "trajectory.waypoints.0: expected x, y, z [m], and"),
         ({"waypoints": [[0.0, 0.0, 5.0], [0.0, 0.0, 5.0]]}, "trajectory.waypoints.1: expected another point"),
+        (
+            {"waypoints": [[0.0, 0.0, 5.0], [6.0, 0.0, -3.0]]},
+            "trajectory.waypoints.1: expected z of at least 0 m, the ground there, got -3 m",
+        ),
         ({"speed": -1.0}, "trajectory.speed: expected a number above 0"),
         ({"turn": "sharp"}, "trajectory.turn: expected 'stop' or 'round'"),
         (
