@@ -9,7 +9,7 @@ from lapwing.services.common.ports import Setpoint
 
 BRAKING = 0.5  # [m/s^2] of a trajectory that is too fast
 SPEED_CHANGE = 1.0  # [m/s^2] maximum change of the approach's speed
-DEEPEST = 1.0  # [m] of the setpoint below the vehicle: more does not lower the thrust
+DEEPEST = 3.0  # [m] of the setpoint below the vehicle: a soft controller (1 rad/s) unloads the feet only so
 
 
 class Approach(NamedTuple):
