@@ -99,7 +99,7 @@ class Clock:
 
     def __init__(self, observer: Observer, config: RunConfig, elsewhere: Iterable[str] = ()):
         self._elsewhere, self._created = set(elsewhere), time.monotonic()
-        self._observer, self._started, self._slow_disk = observer, False, False
+        self._observer, self._started, self._waiting, self._slow_disk = observer, False, False, False
         self._pose, self._status = primary_topic(config, POSE), primary_topic(config, STATUS)
         self._compilation: Compilation | None = Compilation.of(config)  # None after it was shown
         self.elapsed, self.rejected = Elapsed(0.0, 0.0), 0
@@ -116,6 +116,9 @@ class Clock:
             if absent and time.monotonic() - self._created > NOTICE:
                 self._observer.say(f"waiting for {', '.join(sorted(absent))} to join")
                 self._elsewhere = set()
+            if watch.outside and not self._waiting:
+                self._waiting = True
+                self._observer.say(f"waiting for {watch.outside}")
             return False
         if not self._started:
             self._started = True

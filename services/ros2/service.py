@@ -4,6 +4,7 @@ It is not part of the lock step: no service waits for it, and the flight continu
 the run begins when a node publishes a command topic, and the autopilot waits for its answers (`AnsweredInbox`).
 """
 
+import math
 import time
 from typing import Any
 
@@ -50,13 +51,20 @@ def run(process: Participant, spec: Any) -> None:
         event_senders = dict.fromkeys(events, process.participants.gid(MONITOR))  # the run monitor publishes events
         published = process.bus.receive(senders | event_senders)
         lock_step, published_elsewhere = config.resolved.get("ros2", {}).get("lock_step", False), node.publishers()
-        while (
-            lock_step
-            and commands_by_topic
-            and not process.stopping
-            and not any(topic in commands_by_topic for topic in published_elsewhere.copy())
-        ):
-            time.sleep(POLL)
+
+        def commander(seconds: float) -> bool | None:
+            """Return True if another node publishes a command, None if none does within `seconds`."""
+            if any(topic in commands_by_topic for topic in published_elsewhere.copy()):
+                return True
+            time.sleep(seconds)
+            return None
+
+        if lock_step and commands_by_topic:
+            process.wait_for_outside(
+                commander,
+                math.inf,
+                lambda: f"a ROS 2 node that publishes commands, for example {next(iter(commands_by_topic))}",
+            )
         process.join()
         unfinished = set(topics)  # topics that have not ended
         topics |= events
