@@ -75,7 +75,7 @@ def _curve(points: list[Point], name: str) -> np.ndarray:
 
 
 def _cheapest_methods(points: list[Point], goal: float | None, selected: Point | None) -> list[str]:
-    """Return at most six methods: the selected one, those that are the cheapest at some error, those near the goal."""
+    """Return at most six methods: the selected one, the cheapest at each error down from the goal, those near it."""
     level = goal or 1.0
 
     def order(name: str) -> tuple[bool, float]:
@@ -84,7 +84,7 @@ def _cheapest_methods(points: list[Point], goal: float | None, selected: Point |
         return not met, min(met, default=min(p.error for p in own))
 
     chosen = [selected.method] if selected else []
-    front = [cheapest(points, p.error).method for p in sorted(points, key=lambda p: p.error)]
+    front = [cheapest(points, p.error).method for p in sorted(points, key=lambda p: p.error) if p.error <= level]
     near = sorted((p.method for p in points), key=order)
     return list(dict.fromkeys([*chosen, *front, *near]))[: len(COLOURS)]
 
