@@ -296,7 +296,7 @@ def test_comparison_pairs_runs(complete, tmp_path):
     campaign(other, first, workers.run_here)
     code, output = run_lapwing("compare", folder.path, other.path, "--json", tmp_path / "d.json")
     assert (code, f"{RUNS} pairs of runs" in output) == (0, True)
-    assert "differences: overrides\n" in output
+    assert "differences: autopilot.gains=paper (second only)\n" in output
     first, *_ = output.splitlines()
     assert "tracking error " in first
     assert "first difference: actuators: " in first  # other gains, and nothing else
