@@ -47,7 +47,7 @@ def fly_processes(
     """
     check_key_prefix(spec.key_prefix)
     config, spec = spec.config, spec._replace(secret=new_secret())
-    external = spec.external or {}
+    external, links = spec.external or {}, [*auxiliary]
     clock = Clock(observer, config, external)
     names = [*process_table.required_processes(config, external), *([process_table.ROUTER] if spec.open else [])]
     claim = core_of_services(config)
@@ -70,9 +70,7 @@ def fly_processes(
             return clock.observe(watch) or stop.number is not None
 
         try:
-            outputs = launch(
-                names, send_spec, participants, observe, [*auxiliary], external, early or {}, config.services
-            )
+            outputs = launch(names, send_spec, participants, observe, links, external, early or {}, config.services)
         except RunFailed as error:
             if stop.number is not None:
                 raise Interrupted(stop.number, str(error)) from None
@@ -81,7 +79,8 @@ def fly_processes(
             for line in output.splitlines():
                 observer.say(f"{name}: {line}")
         stop.check()
-    if spec.speed is None and (hint := clock.faster_mode(config.services)):
+    needs_processes = links or external or spec.open or spec.realtime
+    if spec.speed is None and not needs_processes and (hint := clock.faster_mode(config.services)):
         observer.say(hint)
     if clock.rejected:
         observer.say(f"rejected: {clock.rejected} messages from outside the run")
