@@ -129,10 +129,7 @@ def campaign(
     seeds = list(seeds)
     if not seeds:
         raise SceneError("seeds", "got none", "at least one")
-    try:
-        campaign_plan = plan(base.name, (), len(seeds), seed, vary, design=design)
-    except ValueError as error:
-        raise ValueError(str(error).removeprefix("--")) from None  # an argument here, an option of the command
+    campaign_plan = plan(base.name, (), len(seeds), seed, vary, design=design)
     fixed = None if campaign_plan.keys else resolve(base)
 
     def config(run: int) -> RunConfig:

@@ -29,14 +29,14 @@ def airframe_of(v: Values) -> Airframe:
     """Return the airframe for the figures.
 
     Raises:
-        ConfigError: figures that do not fit together; its key is the option with the figure.
+        ConfigError: figures that do not fit together; its key is the figure.
     """
     try:
         return validated(Airframe.model_validate, tomllib.loads(airframe_text("new", v, set(v))), Airframe)
     except ConfigError as error:
         table, _, key = error.key.partition(".")
         key = FIGURE_OF_KEY.get(error.key) or (key.partition(".")[0] if key else f"stand_{table}")
-        raise ConfigError(f"--set {key}", error.message, error.expected) from None
+        raise ConfigError(key, error.message, error.expected) from None
 
 
 def airframe_text(name: str, v: Values, measured: set[str]) -> str:
@@ -49,10 +49,9 @@ def airframe_text(name: str, v: Values, measured: set[str]) -> str:
     hubs = [_place(v["arm"], math.pi / count + 2.0 * math.pi * k / count, 0.0) for k in range(count)]
     feet = [_place(v["foot_distance"], math.pi / 4.0 + math.pi / 2.0 * k, -v["foot_depth"]) for k in range(4)]
     inertia = [v["inertia_x"], v["inertia_y"], v["inertia_z"]]
-    guessed = ", ".join(sorted(set(v) - measured))
-
     motor = ["speed_constant", "gear_ratio", "no_load_current", "resistance", "time_constant", "esc_current"]
     motor += ["peak_current"] * ("peak_current" in measured)
+    guessed = ", ".join(sorted(set(v) - measured - {"peak_current"}))  # which only a measurement brings into the file
     units = {figure.name: figure.unit for figure in FIGURES}
     lines = [
         f"# {name}, written by `lapwing new vehicle`. SI units.",
@@ -93,7 +92,7 @@ def airframe_text(name: str, v: Values, measured: set[str]) -> str:
 
 
 def _place(radius: float, angle: float, height: float) -> list[float]:
-    return [round(radius * math.cos(angle), 6), round(radius * math.sin(angle), 6), height]
+    return [round(radius * math.cos(angle), 6) + 0.0, round(radius * math.sin(angle), 6) + 0.0, height]  # no -0.0
 
 
 def _line(key: str, value: Any, comment: str = "") -> str:

@@ -97,9 +97,15 @@ def campaign(
         claim_report("--report", report)
         selected_part = _parse_shard(shard)
 
-        from lapwing.studies.campaign.plan import plan  # imports scipy
+        from lapwing.studies.campaign.plan import SEED, plan  # imports scipy
 
-        campaign_plan = plan(str(scene), set_ or [], runs, seed, _distributions(vary or []), sweep, design)
+        if any(text.partition("=")[0].strip() == SEED for text in set_ or []):
+            raise ValueError(f"--set {SEED}: each run has its own seed, by the seed of the campaign; use --seed")
+        distributions = _distributions(vary or [])
+        try:
+            campaign_plan = plan(str(scene), set_ or [], runs, seed, distributions, sweep, design)
+        except ValueError as error:  # begins with the argument, which the option has as its name
+            raise ValueError(f"--{error}") from None
         selected = with_solver_selected(scene, set_ or [])
         check_firmware_program(selected)
         campaign_plan = campaign_plan._replace(overrides=tuple(selected.overrides))

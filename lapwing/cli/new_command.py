@@ -25,7 +25,8 @@ ModuleName = Annotated[str, typer.Argument(metavar="NAME", help="name of the mod
 @new.command()
 def scene(name: Annotated[str, typer.Argument(metavar="NAME", help="name of the scene, e.g. my_flight")]) -> None:
     """Create a scene: NAME.toml, over waypoints."""
-    typer.echo(write_scene(name, Path()))
+    path = write_scene(name, Path())
+    typer.echo(f"{path}\nnext:\n  lapwing check {path}\n  lapwing run {path} --view")
 
 
 def _register(kind: str, noun: str) -> None:

@@ -3,6 +3,7 @@
 import math
 import sys
 from collections.abc import Callable, Collection
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -16,6 +17,9 @@ from lapwing.dynamics.config_error import ConfigError
 
 if TYPE_CHECKING:
     from lapwing.dynamics.vehicles.airframe import Airframe
+
+
+Ask = Callable[[Figure, float, Callable[[float], object]], float | None]
 
 
 @new.command()
@@ -43,9 +47,11 @@ def vehicle(
         path, lift, remarks = write_vehicle(
             name, values, Path(), interview.ask if interview else None, without_unit(settings)
         )
-    except (ValueError, Interrupted):
+    except (ValueError, Interrupted) as error:
         if interview:
             interview.print_answers()
+        if isinstance(error, ConfigError):
+            raise ConfigError(f"--set {error.key}", error.message, error.expected) from None
         raise
     typer.echo(path)
     typer.echo(lift)
@@ -62,7 +68,7 @@ def write_vehicle(
     name: str,
     measured: Values,
     folder: Path,
-    ask: Callable[[Figure, float], float | None] | None = None,
+    ask: "Ask | None" = None,
     unitless: Collection[str] = (),
 ) -> tuple[Path, str, list[str]]:
     """Write an airframe. Return its path, a line about its thrust over weight, and warnings.
@@ -71,16 +77,17 @@ def write_vehicle(
         name: name of the vehicle.
         measured: values of `lapwing.cli.vehicle_measurements.FIGURES` by name.
         folder: folder that contains `vehicles`.
-        ask: (figure, estimate) -> measured value, None to accept the estimate; without `ask`, all are accepted.
+        ask: returns the measured value of a figure, None to accept the estimate; without `ask`, all are accepted. Its
+            arguments are the figure, the estimate, and a function that raises ConfigError for a value that contradicts
+            the ones before.
         unitless: names of the values given without a unit, which are rejected if another unit was probably meant.
 
     Raises:
-        ValueError: an invalid or used name, an impossible value, or a vehicle that cannot hover.
+        ValueError: an invalid or used name.
+        ConfigError: an impossible value, or a vehicle that cannot hover; its key is the figure.
     """
-    from lapwing.cli.airframe_writer import airframe_of, airframe_text
+    from lapwing.cli.airframe_writer import airframe_text
     from lapwing.cli.vehicle_estimates import WEAK, estimate
-    from lapwing.dynamics.constants import STANDARD_GRAVITY
-    from lapwing.dynamics.vehicles.performance import limited_thrust
     from lapwing.services.common.schemas.run_schema import SHIPPED
 
     if not name.isidentifier() or name != name.lower():
@@ -90,10 +97,12 @@ def write_vehicle(
         raise ValueError(f"NAME {name}: a vehicle has this name; choose another")
     known, earlier = dict(measured), dict[str, float]()
     remarks: list[str] = []
+    if ask:
+        _lift(known)  # each answer is then checked with the ones before
     try:
         for figure in FIGURES:
             if ask and figure.name not in known:
-                value = ask(figure, estimate(known)[figure.name])
+                value = ask(figure, estimate(known)[figure.name], partial(_lift_with, dict(known), figure.name))
                 known |= {} if value is None else {figure.name: value}
             elif figure.name in known:
                 value, guess = known[figure.name], estimate(earlier)[figure.name]
@@ -104,28 +113,46 @@ def write_vehicle(
             earlier |= {figure.name: known[figure.name]} if figure.name in known else {}
         values = estimate(known)
         remarks += filter(None, [_overlap(values)])
-        frame = airframe_of(values)
-        try:
-            thrust, limit = limited_thrust(frame)
-        except ValueError as error:
-            electrics = ("no_load_current", "resistance", "esc_current", "peak_current", "c_rating", "speed_constant")
-            raise ConfigError(
-                f"--set {next((name for name in electrics if name in known), 'mass')}", str(error)
-            ) from None
-        ratio, (reason, causes) = thrust / (values["mass"] * STANDARD_GRAVITY), _limit(frame, limit)
-        if ratio <= 1.0:
-            cause = next((cause for cause in causes if cause in known), "mass")
-            expected = f"more lift by {', '.join(causes)}, or less mass"
-            raise ConfigError(
-                f"--set {cause}", f"the thrust is {ratio:.2f} times the weight, limited by {reason}", expected
-            )
-    except ValueError as error:  # a remark about a unit may name the cause
-        raise ValueError("; ".join([str(error), *remarks])) from None
+        ratio, reason = _lift(known)
+    except ConfigError as error:  # a remark about a unit may name the cause
+        if not remarks:
+            raise
+        raise ConfigError(error.key, "; ".join([error.sentence, *remarks])) from None
     path.parent.mkdir(exist_ok=True)
     write_text(path, airframe_text(name, values, set(known)))
-    lift = f"thrust over weight {ratio:.2f}, limited by {reason} ({', '.join(causes)})"
+    lift = f"thrust over weight {ratio:.2f}, limited by {reason}"
     warning = f"its thrust is {ratio:.2f} times its weight; control authority is small below {WEAK:g}"
     return path, lift, [*remarks, warning] if ratio < WEAK else remarks
+
+
+def _lift_with(known: Values, name: str, value: float) -> tuple[float, str]:
+    return _lift({**known, name: value})
+
+
+def _lift(known: Values) -> tuple[float, str]:
+    """Return the thrust over weight of a vehicle with these figures, and what limits it.
+
+    Raises:
+        ConfigError: the figures contradict each other, or the vehicle cannot hover; its key is a figure.
+    """
+    from lapwing.cli.airframe_writer import airframe_of
+    from lapwing.cli.vehicle_estimates import estimate
+    from lapwing.dynamics.constants import STANDARD_GRAVITY
+    from lapwing.dynamics.vehicles.performance import limited_thrust
+
+    values = estimate(known)
+    frame = airframe_of(values)
+    try:
+        thrust, limit = limited_thrust(frame)
+    except ValueError as error:
+        electrics = ("no_load_current", "resistance", "esc_current", "peak_current", "c_rating", "speed_constant")
+        raise ConfigError(next((name for name in electrics if name in known), "mass"), str(error)) from None
+    ratio, (reason, causes) = thrust / (values["mass"] * STANDARD_GRAVITY), _limit(frame, limit)
+    if ratio <= 1.0:
+        cause = next((cause for cause in causes if cause in known), "mass")
+        expected = f"more lift by {', '.join(causes)}, or less mass"
+        raise ConfigError(cause, f"the thrust is {ratio:.2f} times the weight, limited by {reason}", expected)
+    return ratio, f"{reason} ({', '.join(causes)})"
 
 
 def _limit(frame: "Airframe", limit: str) -> tuple[str, list[str]]:
@@ -153,8 +180,8 @@ class Interview:
     def __init__(self, name: str, values: dict[str, float]):
         self._name, self._answers, self._started = name, dict(values), False
 
-    def ask(self, figure: Figure, guess: float) -> float | None:
-        """Return the measured value of a figure, or None to accept the guess.
+    def ask(self, figure: Figure, guess: float, check: Callable[[float], object]) -> float | None:
+        """Return the measured value of a figure that passes `check`, or None to accept the guess.
 
         Raises:
             ValueError: no user answers.
@@ -166,6 +193,7 @@ class Interview:
         while text := _answer(f"{figure.name}, {figure.unit} [{guess:.4g}]: "):
             try:
                 value = figure.parse(text)
+                check(value)
             except ValueError as error:
                 typer.echo(error)
                 continue

@@ -69,7 +69,7 @@ class Figure(NamedTuple):
         if near and not self._likely(value, guess, self.far):
             meant = min(near, key=lambda name: abs(math.log(others[name] / guess)))
             expected = f"{value:g}{meant}, or {value:g}{self.unit.replace(' ', '')} if that is right"
-            raise ConfigError(f"--set {self.name}={value:g}", self._far_from(value, guess), expected)
+            raise ConfigError(f"{self.name}={value:g}", self._far_from(value, guess), expected)
 
     def _far_from(self, value: float, guess: float) -> str:
         unit = "" if self.unit in ("count", "-") else f" {self.unit}"

@@ -47,7 +47,7 @@ def fly_processes(
     """
     check_key_prefix(spec.key_prefix)
     config, spec = spec.config, spec._replace(secret=new_secret())
-    external = spec.external or {}
+    external, links = spec.external or {}, [*auxiliary]
     clock = Clock(observer, config, external)
     names = [*process_table.required_processes(config, external), *([process_table.ROUTER] if spec.open else [])]
     claim = core_of_services(config)
@@ -70,9 +70,7 @@ def fly_processes(
             return clock.observe(watch) or stop.number is not None
 
         try:
-            outputs = launch(
-                names, send_spec, participants, observe, [*auxiliary], external, early or {}, config.services
-            )
+            outputs = launch(names, send_spec, participants, observe, links, external, early or {}, config.services)
         except RunFailed as error:
             if stop.number is not None:
                 raise Interrupted(stop.number, str(error)) from None
@@ -81,7 +79,8 @@ def fly_processes(
             for line in output.splitlines():
                 observer.say(f"{name}: {line}")
         stop.check()
-    if spec.speed is None and (hint := clock.faster_mode(config.services)):
+    needs_processes = links or external or spec.open or spec.realtime
+    if spec.speed is None and not needs_processes and (hint := clock.faster_mode(config.services)):
         observer.say(hint)
     if clock.rejected:
         observer.say(f"rejected: {clock.rejected} messages from outside the run")
@@ -99,7 +98,7 @@ class Clock:
 
     def __init__(self, observer: Observer, config: RunConfig, elsewhere: Iterable[str] = ()):
         self._elsewhere, self._created = set(elsewhere), time.monotonic()
-        self._observer, self._started, self._slow_disk = observer, False, False
+        self._observer, self._started, self._waiting, self._slow_disk = observer, False, False, False
         self._pose, self._status = primary_topic(config, POSE), primary_topic(config, STATUS)
         self._compilation: Compilation | None = Compilation.of(config)  # None after it was shown
         self.elapsed, self.rejected = Elapsed(0.0, 0.0), 0
@@ -116,6 +115,9 @@ class Clock:
             if absent and time.monotonic() - self._created > NOTICE:
                 self._observer.say(f"waiting for {', '.join(sorted(absent))} to join")
                 self._elsewhere = set()
+            if watch.outside and not self._waiting:
+                self._waiting = True
+                self._observer.say(f"waiting for {watch.outside}")
             return False
         if not self._started:
             self._started = True

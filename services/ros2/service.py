@@ -4,6 +4,7 @@ It is not part of the lock step: no service waits for it, and the flight continu
 the run begins when a node publishes a command topic, and the autopilot waits for its answers (`AnsweredInbox`).
 """
 
+import math
 import time
 from typing import Any
 
@@ -28,7 +29,7 @@ def run(process: Participant, spec: Any) -> None:
         spec: its `ProcessSpec`.
 
     Raises:
-        ValueError: the node cannot reach or open a Zenoh router.
+        ValueError: no vehicle can be commanded in lock step, or the node cannot reach or open a Zenoh router.
     """
     config = process.config
     topics, senders = {}, {}
@@ -37,6 +38,9 @@ def run(process: Participant, spec: Any) -> None:
             topics[process.key(topic)] = topic
             senders[process.key(topic)] = process.participants.encoder_gid(name)
     commands_by_topic = {topic: commands for commands in _commands(config) for topic in commands.messages}
+    lock_step = config.resolved.get("ros2", {}).get("lock_step", False)
+    if lock_step and not commands_by_topic:
+        raise ValueError("ros2.lock_step: no vehicle accepts commands; expected autopilot.accept_commands = true")
     operate = process.bus.publisher(f"{process.key_prefix}/{OPERATOR_KEY}/{process.name}")
     with Node(spec.ros2, spec.ros2_router, spec.insecure) as node:
         for topic in topics.values():
@@ -49,14 +53,21 @@ def run(process: Participant, spec: Any) -> None:
         )
         event_senders = dict.fromkeys(events, process.participants.gid(MONITOR))  # the run monitor publishes events
         published = process.bus.receive(senders | event_senders)
-        lock_step, published_elsewhere = config.resolved.get("ros2", {}).get("lock_step", False), node.publishers()
-        while (
-            lock_step
-            and commands_by_topic
-            and not process.stopping
-            and not any(topic in commands_by_topic for topic in published_elsewhere.copy())
-        ):
-            time.sleep(POLL)
+        published_elsewhere = node.publishers()
+
+        def commander(seconds: float) -> bool | None:
+            """Return True if another node publishes a command, None if none does within `seconds`."""
+            if any(topic in commands_by_topic for topic in published_elsewhere.copy()):
+                return True
+            time.sleep(seconds)
+            return None
+
+        if lock_step:
+            process.wait_for_outside(
+                commander,
+                math.inf,
+                lambda: f"a ROS 2 node that publishes commands, for example {next(iter(commands_by_topic))}",
+            )
         process.join()
         unfinished = set(topics)  # topics that have not ended
         topics |= events

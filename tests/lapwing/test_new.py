@@ -74,7 +74,9 @@ def test_created_module_flies_by_its_first_lines(tmp_path, kind):
 
 
 def test_created_scene_flies(tmp_path):
-    assert run_command("new", "scene", "my_flight", folder=tmp_path).stdout == "my_flight.toml\n"
+    assert run_command("new", "scene", "my_flight", folder=tmp_path).stdout.startswith("my_flight.toml\nnext:\n")
+    unknown = run_command("check", "my_flight", folder=tmp_path, code=2).stderr
+    assert "unknown scene 'my_flight'; did you mean my_flight.toml? expected one of " in unknown
     result = run_command("run", "my_flight.toml", "--mode", "single-process", folder=tmp_path, code=0)
     assert re.search(r"Landed .* ends at \(6\.00, 4\.00, ", " ".join(result.stdout.split()))
     assert_rejected(run_command("new", "scene", "my_flight", folder=tmp_path))

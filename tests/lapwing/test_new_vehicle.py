@@ -44,7 +44,7 @@ def test_rotors_reproduce_thrust_stand(tmp_path):
 def test_missing_figure_is_prompted_with_its_measurement(tmp_path):
     requested = []
 
-    def ask(figure, guess):
+    def ask(figure, guess, check):
         requested.append(figure.name)
         assert len(figure.how) > 10
         return guess if figure.name != "arm" else None
@@ -103,11 +103,16 @@ def test_interrupted_interview_prints_its_answers(tmp_path, end, code, last):
     assert not (tmp_path / "vehicles").exists()
 
 
-def test_answers_that_do_not_fit_together_are_printed(tmp_path):
-    output, code = in_a_terminal(tmp_path, "1.5\n", "2\n", *["\n"] * 40)
-    assert code == 2
-    assert "with these answers: lapwing new vehicle mine --set mass=1.5 --set payload=2" in output
-    assert "--set payload: expected less than total = 1.5 kg, got 2" in output.splitlines()[-1]
+def test_answer_that_contradicts_earlier_ones_is_prompted_again(tmp_path):
+    output, code = in_a_terminal(tmp_path, "1.5\n", "2\n", "0.2\n", *["\n"] * 40)
+    assert code == 0, output
+    assert "payload: expected less than total = 1.5 kg, got 2\npayload, kg [0]: " in output
+    assert "payload = 0.2 " in (tmp_path / "vehicles/mine.toml").read_text()
+
+
+def test_options_that_contradict_each_other_are_rejected_before_first_question(tmp_path):
+    output, code = in_a_terminal(tmp_path, more=("--set", "mass=1.5", "--set", "payload=2"))
+    assert (code, output) == (2, "lapwing: --set payload: expected less than total = 1.5 kg, got 2\n")
 
 
 def test_figure_far_from_its_guess_is_warned_of(tmp_path):
@@ -142,16 +147,16 @@ def test_number_whose_unit_was_probably_forgotten_is_rejected(tmp_path, monkeypa
         ({"rotors": 5.0}, "rotors: expected 4, 6 or 8"),
         ({"cells": 4.5}, "cells: expected a whole number, got 4.5"),
         ({"mass": math.nan}, "mass: expected a number"),
-        ({"mass": 2.0, "payload": 3.0}, "--set payload: expected less than total"),
-        ({"mass": 2.0, "arm": 0.2, "inertia_x": 0.02, "inertia_y": 0.02, "inertia_z": 9.0}, "--set inertia_x, inertia"),
+        ({"mass": 2.0, "payload": 3.0}, "payload: expected less than total"),
+        ({"mass": 2.0, "arm": 0.2, "inertia_x": 0.02, "inertia_y": 0.02, "inertia_z": 9.0}, "inertia_x, inertia"),
         (
             {"mass": 2.0, "diameter": 0.25, "cells": 4.0, "speed_constant": 100.0},
-            r"--set speed_constant: the thrust is 0\.\d\d times the weight, limited by the 14.8 V of the battery; "
+            r"speed_constant: the thrust is 0\.\d\d times the weight, limited by the 14.8 V of the battery; "
             "expected more lift by speed_constant, cells, diameter, or less mass",
         ),
         (
             {"mass": 2.0, "diameter": 0.25, "cells": 4.0, "speed_constant": 800.0, "esc_current": 2.0},
-            r"--set esc_current: the thrust is 0\.\d\d times the weight, limited by the 2 A of the controller",
+            r"esc_current: the thrust is 0\.\d\d times the weight, limited by the 2 A of the controller",
         ),
         (
             {"resistance": 60.0, "no_load_current": 0.6, "cells": 4.0},
@@ -159,11 +164,11 @@ def test_number_whose_unit_was_probably_forgotten_is_rejected(tmp_path, monkeypa
         ),
         (
             {"stand_speed": 600.0, "stand_thrust": 50.0, "diameter": 0.25, "pitch": 0.1},
-            r"--set stand_thrust: 50 N at 600 rad/s is more than .* expected at most 7.\d* N, a higher speed",
+            r"stand_thrust: 50 N at 600 rad/s is more than .* expected at most 7.\d* N, a higher speed",
         ),
         (
             {"stand_torque": 1e-4, "stand_thrust": 5.0, "diameter": 0.25, "pitch": 0.11},
-            r"--set stand_torque: 0.0001 N m at .* rad/s is less than a thrust of 5 N needs; expected at least 0.0",
+            r"stand_torque: 0.0001 N m at .* rad/s is less than a thrust of 5 N needs; expected at least 0.0",
         ),
     ],
 )

@@ -69,6 +69,7 @@ class RunMonitor:
         self.newest: dict[Topic, bytes] = {}
         self.on_batches: Callable[[list[RecordBatch]], None] | None = None  # called with all messages
         self.waiting: dict[str, str] = {}
+        self.outside = ""  # program outside the run that a service waits for
         self.compiling = False  # a participant compiles kernels
         self.diverged = False  # a state is invalid: the run ends with the reason in its log
         self.slow_disk = False  # True if the recorder has waited for the disk
@@ -133,6 +134,7 @@ class RunMonitor:
             self.waiting[name] = payload.decode(errors="replace")
         elif head == OUTSIDE_KEY:
             self.last_news = time.monotonic()  # the service has its own time-out
+            self.outside = payload.decode(errors="replace")
         elif head == RECORDED_KEY:
             self._read_log_progress(payload)
         elif head == ENDED_KEY:

@@ -143,7 +143,9 @@ def _find(scene: str | Path, shipped: Path) -> Path:
     if not (shipped / f"{path}.toml").is_file():
         choices = [p.stem for p in shipped.glob("*.toml")]
         error = ConfigError.unknown("", "scene", str(path), choices)
-        raise SceneError("", error.message, f"{error.expected}, or the path of a .toml file")
+        own = path.with_suffix(".toml")
+        message = f"unknown scene '{path}'; did you mean {own}?" if own.is_file() else error.message
+        raise SceneError("", message, f"{error.expected}, or the path of a .toml file")
     return shipped / f"{path}.toml"
 
 

@@ -102,7 +102,7 @@ class HostProcess:
         patience = Patience(self._limit, self._process.pid)
         while data:
             while not self._poll(1e3 * min(LOOK, 0.25 * self._limit)):
-                self._report_wait(f"waits for the FMU of {self._name}")
+                self._report_wait(f"the FMU of {self._name}")
                 if patience.over:
                     self._process.kill()
                     self._end()

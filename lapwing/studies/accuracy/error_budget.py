@@ -112,6 +112,14 @@ def errors(scene: Scene) -> list[ErrorSource]:
     return parts
 
 
+def largest(scene: Scene, parts: list[ErrorSource]) -> ErrorSource | None:
+    """Return the largest error source at the scene's communication step; that of solver and contact at the coarsest."""
+    coarsest = {part.source: part for part in reversed(parts)}
+    if scene[Communication].coupling == "gauss_seidel":
+        coarsest.pop(SOURCES[3], None)
+    return max(coarsest.values(), key=lambda part: (part.position, part.attitude), default=None)
+
+
 def has_contact(scene: Scene) -> bool:
     """Return True if a vehicle of the scene can touch the ground."""
     return any("ground_contact" in vehicle.tables("effects") for vehicle in scene.each_vehicle)

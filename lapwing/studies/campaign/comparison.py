@@ -1,7 +1,8 @@
 """Paired comparison of two campaigns over the same seeds, and the first difference of one pair of flights."""
 
+from collections.abc import Mapping
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -90,7 +91,7 @@ def compare(one: Path, other: Path) -> Comparison:
     different_values = [
         f"{key} (different values)" for key in keys if not np.array_equal(a[key][rows_a], b[key][rows_b])
     ]
-    differing = [name for name in PLAN_ENTRIES if a.folder.about[name] != b.folder.about[name]] + different_values
+    differing = _differing_entries(a.folder.about, b.folder.about) + different_values
     path_a, path_b = _path_error(a)[rows_a], _path_error(b)[rows_b]
     most = int(np.argmax(np.nan_to_num(np.abs(path_b - path_a), nan=-1.0)))
     result = Comparison(
@@ -101,6 +102,17 @@ def compare(one: Path, other: Path) -> Comparison:
         return result._replace(first=first_difference(a.folder, b.folder, result.run))
     except ValueError as error:
         return result._replace(not_flown=str(error))
+
+
+def _differing_entries(one: Mapping[str, Any], other: Mapping[str, Any]) -> list[str]:
+    """Return the entries in which two plans differ; of overrides, those that only one has."""
+    result = [name for name in PLAN_ENTRIES if one[name] != other[name]]
+    own = [f"{text} (first only)" for text in one["overrides"] if text not in other["overrides"]]
+    own += [f"{text} (second only)" for text in other["overrides"] if text not in one["overrides"]]
+    if own:
+        at = result.index("overrides")
+        result[at : at + 1] = own
+    return result
 
 
 def _path_error(results: Results) -> np.ndarray:

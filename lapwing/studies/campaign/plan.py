@@ -41,11 +41,11 @@ class Plan(NamedTuple):
         """Varied keys."""
         return [*(key for key, _ in self.vary), *(self.sweep[0] if self.sweep else ())]
 
-    def option(self, key: str) -> str:
-        """Return the command-line option that varies a key; "" if there is none."""
+    def argument(self, key: str) -> str:
+        """Return the argument of `plan` that varies a key; "" if there is none."""
         if any(key == name for name, _ in self.vary):
-            return "--vary"
-        return "--sweep: column" if key in self.keys else ""
+            return "vary"
+        return "sweep: column" if key in self.keys else ""
 
     def seed_of(self, run: int) -> int:
         """Return the seed of a run: 1, 2, ... of campaign 1; no two campaigns share a seed."""
@@ -80,7 +80,7 @@ def plan(
 
     Args:
         path: path or name of the scene.
-        overrides: KEY=VALUE of every run.
+        overrides: KEY=VALUE of every run, of other keys than `SEED`.
         runs: number of runs; by default the entries of the sweep, the points of the grid, or 100.
         seed: seed of the campaign.
         vary: distribution by key.
@@ -89,32 +89,30 @@ def plan(
             combinations of finitely many values.
 
     Raises:
-        ValueError: an argument is invalid.
+        ValueError: an argument is invalid; the message begins with its name.
     """
     distributions, sweep_rows = tuple(sorted((vary or {}).items())), _read_sweep(sweep) if sweep else ()
     if duplicates := sorted(set(vary or {}) & set(sweep_rows[0] if sweep_rows else ())):
-        raise ValueError(f"--vary {duplicates[0]}: also varied by the sweep {sweep}; use one of both")
+        raise ValueError(f"vary {duplicates[0]}: also varied by the sweep {sweep}; use one of both")
     for key, distribution in distributions:
         if missing := [other for other, _ in distribution.weights if other not in (vary or {})]:
-            raise ValueError(f"--vary {key}: is correlated with {missing[0]}, which does not vary; vary both")
-    overrides = tuple(overrides)
-    fixed = "override" if any(text.partition("=")[0].strip() == SEED for text in overrides) else ""
-    if option := Plan(path, (), seed, 1, distributions, sweep_rows).option(SEED) or fixed:
-        raise ValueError(f"{option} {SEED}: each run has its own seed; use --seed")
+            raise ValueError(f"vary {key}: is correlated with {missing[0]}, which does not vary; vary both")
+    if argument := Plan(path, (), seed, 1, distributions, sweep_rows).argument(SEED):
+        raise ValueError(f"{argument} {SEED}: each run has its own seed, by the seed of the campaign; leave it out")
     if design not in _DESIGNS:
-        raise ValueError(f"--design {design}: expected one of {', '.join(_DESIGNS)}")
+        raise ValueError(f"design {design}: expected one of {', '.join(_DESIGNS)}")
     if design in ("lhs", "sobol") and not distributions:
-        raise ValueError(f"--design {design}: expected a key that varies")
+        raise ValueError(f"design {design}: expected a key that varies")
     points = math.prod(len(d.values) for _, d in distributions if d.values)
     if design == "grid" and not any(d.values for _, d in distributions):
-        raise ValueError("--design grid: expected a key that varies by choice(...) or linspace(...)")
+        raise ValueError("design grid: expected a key that varies by choice(...) or linspace(...)")
     if runs is None:
         runs = len(sweep_rows) or (points if design == "grid" else 100)
     if not 1 <= runs <= MAX_RUNS:
-        raise ValueError(f"--runs {runs}: expected a number from 1 to {MAX_RUNS}")
+        raise ValueError(f"runs {runs}: expected a number from 1 to {MAX_RUNS}")
     if not 1 <= seed < 2**63 // SEED_STRIDE:
-        raise ValueError(f"--seed {seed}: expected a whole number from 1 to {2**63 // SEED_STRIDE - 1}")
-    return Plan(path, overrides, seed, runs, distributions, sweep_rows, design)
+        raise ValueError(f"seed {seed}: expected a whole number from 1 to {2**63 // SEED_STRIDE - 1}")
+    return Plan(path, tuple(overrides), seed, runs, distributions, sweep_rows, design)
 
 
 def _random_bits(seed: int, run: int, key: str) -> int:
@@ -178,16 +176,16 @@ def _read_sweep(path: Path) -> tuple[dict[str, Any], ...]:
     try:
         lines = list(csv.reader(io.StringIO(read_text(path, "utf-8-sig")), skipinitialspace=True))
     except (OSError, UnicodeDecodeError) as fault:
-        raise unreadable(f"--sweep {path}", fault, "a table of scene keys (.csv)") from None
+        raise unreadable(f"sweep {path}", fault, "a table of scene keys (.csv)") from None
     keys, *rows = [[cell.strip() for cell in line] for line in lines if line] or [[]]
     if len(keys) == 1 and ";" in keys[0]:
-        raise ValueError(f"--sweep {path}: columns are separated by semicolons; expected commas")
+        raise ValueError(f"sweep {path}: columns are separated by semicolons; expected commas")
     if not keys or not rows or len(set(keys)) != len(keys):
-        raise ValueError(f"--sweep {path}: expected a header of distinct keys, and a line of values for each run")
+        raise ValueError(f"sweep {path}: expected a header of distinct keys, and a line of values for each run")
     for number, row in enumerate(rows, 2):
         if len(row) != len(keys):
-            raise ValueError(f"--sweep {path}: line {number}: expected {len(keys)} values, got {len(row)}")
+            raise ValueError(f"sweep {path}: line {number}: expected {len(keys)} values, got {len(row)}")
     try:
         return tuple(dict(zip(keys, map(value_of, row), strict=True)) for row in rows)
     except ValueError as fault:
-        raise ValueError(f"--sweep {path}: {fault}") from None
+        raise ValueError(f"sweep {path}: {fault}") from None

@@ -172,8 +172,8 @@ def name_option_in_errors(plan: Plan) -> Iterator[None]:
         yield
     except SceneError as error:
         override = (error.source.override or "").partition("=")[0]
-        if option := plan.option(override):
-            source = error.source._replace(option=option)
+        if argument := plan.argument(override):
+            source = error.source._replace(option=f"--{argument}")
             raise SceneError(error.key, error.message, error.expected, source) from error.__cause__
         raise
 

@@ -44,6 +44,7 @@ class Study(NamedTuple):
     goal: float  # error for which a solver is selected
     selected: Point | None  # cheapest point that meets the goal; None if none does
     parts: list[ErrorSource]  # error sources of a scene's flight
+    largest: ErrorSource | None  # the largest of them with the scene's communication
     rounding: RoundOff | None  # None for a problem without steps in extended precision
     cost: tuple[float, float] | None  # [ns] of a plant step of a scene with contact: hovering, on the ground
 
@@ -87,12 +88,17 @@ def study(
     parts = error_budget.errors(scene) if scene else []
     cost = costs(scene, [tables_of(scene)])[0][:2] if scene and error_budget.has_contact(scene) else None
     say("round-off", methods + 1)
-    return Study(target, problem, points, asked, selected, parts, round_off.measure(problem), cost)
+    largest = error_budget.largest(scene, parts) if scene else None
+    return Study(target, problem, points, asked, selected, parts, largest, round_off.measure(problem), cost)
 
 
 def show(screen: Console, study: Study) -> None:
     """Print the answer, the table of the points, and the error sources of a scene's flight."""
     screen.print(answer(study), highlight=False, soft_wrap=True)
+    if part := study.largest:
+        size = f"{part.position:.1e} m" if part.position else f"{part.attitude:.1e} rad"
+        text = f"the flight errs most by its {part.source} ({part.label}): {size}; its error sources are listed below"
+        screen.print(text, highlight=False, soft_wrap=True)
     show_points(screen, study.problem, study.points, study.rounding)
     if study.parts:
         show_error_sources(screen, study.parts, study.cost)

@@ -8,7 +8,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from lapwing.studies.accuracy.error_budget import ErrorSource
-from lapwing.studies.accuracy.work_precision import Point
+from lapwing.studies.accuracy.work_precision import Point, cheapest
 from lapwing.views.report.matplotlib_figure import plot_style
 from lapwing.views.report.style import BOUND, DPI, QUIET, TEXT
 
@@ -41,7 +41,7 @@ def draw(
 def draw_points(axes: Axes, points: list[Point], goal: float | None, selected: Point | None) -> None:
     """Plot each method from coarse to fine, with the quartiles of the times, the target, and the selected point."""
     curves = {name: _curve(points, name) for name in dict.fromkeys(p.method for p in points)}
-    labelled = _cheapest_methods(points, goal)
+    labelled = _cheapest_methods(points, goal, selected)
     for name, curve in curves.items():
         number = labelled.index(name) if name in labelled else None
         colour = QUIET if number is None else COLOURS[number]
@@ -74,8 +74,8 @@ def _curve(points: list[Point], name: str) -> np.ndarray:
     return np.array([1e3 * time, np.maximum(error, SMALLEST), 1e3 * low, 1e3 * high])
 
 
-def _cheapest_methods(points: list[Point], goal: float | None) -> list[str]:
-    """Return at most six methods, by the work of their cheapest point that meets the goal; others by their error."""
+def _cheapest_methods(points: list[Point], goal: float | None, selected: Point | None) -> list[str]:
+    """Return at most six methods: the selected one, the cheapest at each error down from the goal, those near it."""
     level = goal or 1.0
 
     def order(name: str) -> tuple[bool, float]:
@@ -83,7 +83,10 @@ def _cheapest_methods(points: list[Point], goal: float | None) -> list[str]:
         met = [p.work[0] for p in own if p.error <= level]
         return not met, min(met, default=min(p.error for p in own))
 
-    return sorted(dict.fromkeys(p.method for p in points), key=order)[: len(COLOURS)]
+    chosen = [selected.method] if selected else []
+    front = [cheapest(points, p.error).method for p in sorted(points, key=lambda p: p.error) if p.error <= level]
+    near = sorted((p.method for p in points), key=order)
+    return list(dict.fromkeys([*chosen, *front, *near]))[: len(COLOURS)]
 
 
 def _label(axes: Axes, curves: dict[str, np.ndarray], selected: Point | None) -> None:

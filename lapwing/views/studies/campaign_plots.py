@@ -18,6 +18,7 @@ from lapwing.views.report.style import AXIS_COLOURS, BOUND, COLOURS, FLOWN, QUIE
 
 COLUMNS = 3  # panels in a row
 BINS = 10  # intervals of a parameter
+MARGIN = 0.04  # of the range of a distribution, on both sides
 LANE = 28  # characters in a line of a criterion
 
 
@@ -74,7 +75,7 @@ def _distributions(results: Results, names: list[str], caption: str) -> Plot:
     limits, panels = {row.metric: row.limit for row in criteria(results) if row.metric}, []
     for k, name in enumerate(names):
         label, scale = label_and_factor(name)
-        marks: list[Mark] = []
+        marks: list[Line] = []
         for legend, column, colour in _by_vehicle(results, name):
             values = scale * np.sort(column[np.isfinite(column)])
             marks.append(Line(values, np.arange(1, len(values) + 1) / len(values), legend, colour))
@@ -82,9 +83,16 @@ def _distributions(results: Results, names: list[str], caption: str) -> Plot:
             marks.append(_vertical_line(scale * results.published[name], results.source, REFERENCE))
         if name in limits:
             marks.append(_vertical_line(scale * limits[name], "required", BOUND))
-        position: dict[str, Any] = {"row": k // COLUMNS, "column": k % COLUMNS}
-        panels.append(Panel(tuple(marks), "share" if k % COLUMNS == 0 else "", label, timed=False, **position))
+        place: dict[str, Any] = {"row": k // COLUMNS, "column": k % COLUMNS, "x_range": _with_margin(marks)}
+        panels.append(Panel(tuple(marks), "share" if k % COLUMNS == 0 else "", label, timed=False, **place))
     return _grid(panels, caption)
+
+
+def _with_margin(marks: list[Line]) -> tuple[float, float] | None:
+    """Return the range of lines with a margin, so that none lies on the edge; None where all are at one value."""
+    x = np.concatenate([line.x for line in marks])
+    low, high = float(x.min()), float(x.max())
+    return (low - MARGIN * (high - low), high + MARGIN * (high - low)) if high > low else None
 
 
 def _by_vehicle(results: Results, name: str) -> list[tuple[str, np.ndarray, str]]:
@@ -180,7 +188,7 @@ def sensitivity(results: Results) -> Plot:
         for column, kind in enumerate(kinds):
             values = {key: by_key[key].share if column else by_key[key].correlation for key in keys}
             bars = tuple(
-                Stretch(key, 0.0, v.value, f"{v.value:.2f}", QUIET if v.low <= 0.0 <= v.high else AXIS_COLOURS[column])
+                Stretch(key, 0.0, v.value, f"{v.value:z.2f}", QUIET if v.low <= 0.0 <= v.high else AXIS_COLOURS[column])
                 for key, v in values.items()
                 if np.isfinite(v.value)
             )

@@ -13,7 +13,7 @@ from lapwing.studies.campaign.comparison import Comparison
 from lapwing.studies.campaign.explanation import Explanation
 from lapwing.studies.campaign.fleet_columns import NEAREST
 from lapwing.studies.campaign.results import Results
-from lapwing.studies.campaign.statistics import percent
+from lapwing.studies.campaign.statistics import Interval, percent
 from lapwing.studies.campaign.verdict import criteria, drivers, subject, verdict
 from lapwing.views.studies import campaign_plots
 from lapwing.views.studies.campaign_plots import label_and_factor
@@ -191,11 +191,19 @@ def _facts(results: Results) -> dict[str, str]:
     return {name: text for name, text in facts.items() if text}
 
 
+def _change(ratio: Interval) -> str:
+    """Format a relative change: in per cent up to ten times."""
+    if ratio.value < 9.0:
+        return percent(ratio, signed=True)
+    times, low, high = (f"{1.0 + number:.4g}" for number in ratio)
+    return f"{times} times as large (95 %: {low} to {high})"
+
+
 def comparison_result(comparison: Comparison) -> StudyResult:
     """Return the result of a comparison of two campaigns."""
     tracking = comparison.tracking
     failing = next(d.difference for d in comparison.differences if d.figure == "success")
-    texts = [f"tracking error {percent(tracking, signed=True)}"] if math.isfinite(tracking.value) else []
+    texts = [f"tracking error {_change(tracking)}"] if math.isfinite(tracking.value) else []
     n, first = comparison.pairs, comparison.first
     texts.append(f"failures {' and '.join(str(round(n * p.value)) for p in comparison.failures)} of {n}")
     if first:

@@ -99,7 +99,8 @@ def _plot(study: Study) -> Plot:
         marks.append(Stretch(name, MIN_BAR / 2.0, min(max(distance, MIN_BAR), longest), "", colour))
     corner = np.full(2, MIN_BAR / 2.0), np.full(2, -0.5)  # place of lines without length, for the legend
     legend = {"needed": FLOWN, "can be omitted": OMITTED, "(missing)": BOUND, "(not needed)": QUIET}
-    marks += [Line(*corner, name, colour) for name, colour in legend.items()]
+    drawn = {mark.colour for mark in marks}
+    marks += [Line(*corner, name, colour) for name, colour in legend.items() if colour in drawn]
     tolerance = np.full(2, study.within)
     marks.append(Line(tolerance, np.array([-0.5, len(rows) - 0.5]), f"tolerance {study.within:g} m", BOUND))
     label = "largest change of the trajectory [m]; beside the names: cost of a plant step, hovering"

@@ -32,6 +32,7 @@ from lapwing.services.process_table import ROS2, required_processes
 from lapwing.services.ros2.commands import SOURCE
 from lapwing.services.ros2.node import ROUTER, Node, parse_router
 from lapwing.services.scene_resolver import load, resolve
+from tests.commands import run_command
 from tests.endpoints import loopback_endpoints
 
 pytestmark = pytest.mark.long
@@ -228,6 +229,7 @@ def test_node_in_lock_step_flies_the_same_at_any_speed(tmp_path, port, diagram):
             run.kill()
             node.kill()
         assert (run.returncode, node.returncode) == (0, 0), output + answers
+        assert "single-process" not in output  # a mode without nodes
         digests.append(json.loads((tmp_path / "a.json").read_text())["digest"])
     assert digests[0] == digests[1]
     flight = read_log(tmp_path / "a.mcap")
@@ -235,6 +237,23 @@ def test_node_in_lock_step_flies_the_same_at_any_speed(tmp_path, port, diagram):
     again = [sys.executable, "-m", "lapwing", "resimulate", str(tmp_path / "a.mcap")]
     done = subprocess.run(again, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stdout + done.stderr
+
+
+def test_run_in_lock_step_says_for_which_node_it_waits(tmp_path, port):
+    run = fly(tmp_path, port, "--set", "ros2.lock_step=true", "--speed", "max")
+    try:
+        lines = iter(run.stdout.readline, "")
+        assert "waiting for a ROS 2 node that publishes commands, for example /drone1/command/arm\n" in lines
+    finally:
+        run.terminate()
+        run.communicate(timeout=PATIENCE)
+
+
+def test_lock_step_without_commanded_vehicle_is_rejected(tmp_path, port):
+    done = run_command("run", "hover", "--ros2", "0", "--ros2-router", f"127.0.0.1:{port}", "--speed", "max",
+                       "--set", "ros2.lock_step=true", "--log", tmp_path / "a.mcap", code=2)  # fmt: skip
+    expected = "ros2.lock_step: no vehicle accepts commands; expected autopilot.accept_commands = true\n"
+    assert done.stderr.endswith(expected)
 
 
 def test_commands_of_a_tick_do_not_depend_on_the_order_of_arrival():

@@ -126,7 +126,7 @@ def test_problem_name_precedes_scene_name():
 
 
 def test_json_and_picture(tmp_path):
-    study = accuracy_command.Study("decay", decay(), points(), 1e-4, points()[1], [], None, None)
+    study = accuracy_command.Study("decay", decay(), points(), 1e-4, points()[1], [], None, None, None)
     accuracy_command.write_json(tmp_path / "a.json", study)
     data = json.loads((tmp_path / "a.json").read_text())
     assert data["cheapest"]["method"] == "one"
@@ -174,7 +174,9 @@ def test_scene_with_contact_has_error_sources_and_cost(capsys, monkeypatch):
     assert result.selected.error <= 1e-3
     assert min(result.cost) > 0.0
     assert {part.source for part in result.parts} == set(SOURCES)
-    assert "in contact" in capsys.readouterr().out
+    printed = capsys.readouterr().out
+    assert "the flight errs most by its communication step (250 Hz): " in printed
+    assert "in contact" in printed
 
 
 def test_table_fits_80_columns(capsys):
@@ -197,3 +199,12 @@ def test_labels_of_curves_that_end_together_are_apart():
     assert len(heights) == 6
     assert min(np.diff(heights)) > 0.99 * LABEL
     assert heights[0] >= 0.0
+
+
+def test_cheapest_method_at_each_error_has_a_name():
+    names = [f"method{k}" for k in range(8)]
+    points = [Point(name, 4, "s", 0.1, 1e-3 * 10.0**-k, 1e-4, 100 + k, {}) for k, name in enumerate(names)]
+    points += [Point("dear", 8, "s", 0.1, 1e-12, 1e-2, 1000, {})]
+    axes = Figure().subplots()
+    draw_points(axes, points, 1e-3, points[0])
+    assert {"method0, chosen", "dear"} < {text.get_text() for text in axes.texts}

@@ -298,7 +298,7 @@ def test_comparison_pairs_runs(complete, tmp_path):
     campaign(other, first, workers.run_here)
     code, output = run_lapwing("compare", folder.path, other.path, "--json", tmp_path / "d.json")
     assert (code, f"{RUNS} pairs of runs" in output) == (0, True)
-    assert "differences: overrides\n" in output
+    assert "differences: autopilot.gains=paper (second only)\n" in output
     first, *_ = output.splitlines()
     assert "tracking error " in first
     assert "first difference: actuators: " in first  # other gains, and nothing else
@@ -330,8 +330,8 @@ def test_comparison_pairs_runs(complete, tmp_path):
         (["hover", "--vary", "effects.gravity.0=uniform(0,1)"], "lapwing: --vary effects.gravity.0: "),
         (["hover", "--vary", "run.title.a=uniform(0,1)"], "lapwing: --vary run.title.a"),
         (["hover", "--vary", "=uniform(0,1)"], "--vary =uniform(0,1): expected KEY=DISTRIBUTION"),
-        (["hover", "--vary", "run.seed=choice(1,2)"], "--vary run.seed: each run has its own seed; use --seed"),
-        (["hover", "--set", "run.seed=4"], "override run.seed: each run has its own seed; use --seed"),
+        (["hover", "--vary", "run.seed=choice(1,2)"], "--vary run.seed: each run has its own seed"),
+        (["hover", "--set", "run.seed=4"], "--set run.seed: each run has its own seed"),
         (
             ["hover", "--vary", "vehicle.mass=normal(10,1)", "--vary", "vehicle.mass=uniform(9,10)"],
             "--vary vehicle.mass=uniform(9,10): vehicle.mass already has a distribution",

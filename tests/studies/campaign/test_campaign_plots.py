@@ -24,7 +24,7 @@ KEYS = ("a", "b")
 MANY = tuple("abcdefghijkl")
 
 
-def table(runs, sweep=None, keys=KEYS, **values):
+def table(runs, sweep=None, keys=KEYS, published=(), **values):
     """Return the results of a campaign over `keys`; metrics without a function are NaN."""
     new_plan = plan("hover", runs=runs, vary={} if sweep else dict.fromkeys(keys, uniform(0, 1)), sweep=sweep)
     drawn = {key: np.array([new_plan.values(run)[key] for run in range(runs)], float) for key in keys}
@@ -32,7 +32,7 @@ def table(runs, sweep=None, keys=KEYS, **values):
     kinds |= {name: str if name in ("outcome", "outcome_text") else float for name in METRICS}
     result = {name: np.full(runs, np.nan) for name in kinds}
     result |= {"run": np.arange(runs), "success": np.ones(runs, bool), "outcome": np.full(runs, "landed", object)}
-    about = {"vehicles": [], "published": {}, "success": [], "scene": "hover"}
+    about = {"vehicles": [], "published": dict(published), "success": [], "scene": "hover"}
     arrays = result | drawn | {name: function(drawn) for name, function in values.items()}
     return Results(SimpleNamespace(arrays=lambda: arrays, plan=new_plan, about=about, kinds=kinds))
 
@@ -52,6 +52,15 @@ def test_missing_values_do_not_affect_other_metrics():
     assert bars(plot, "rank", "touchdown.speed")["a"] == pytest.approx(1.0)
     assert abs(bars(plot, "rank", "touchdown.speed")["b"]) < 0.2
     assert bars(plot, "rank", "energy") == pytest.approx({"a": 0.0, "b": 1.0}, abs=0.15)
+
+
+def test_published_value_is_not_on_the_edge():
+    result = table(50, published={"rmse": {"x": 3.0}}, **{"rmse.x": lambda drawn: drawn["a"]})
+    (panel,) = errors(result).panels
+    published = panel.marks[-1].x[0]
+    assert published == 3.0
+    assert panel.x_range[0] < panel.marks[0].x.min()
+    assert panel.x_range[1] > published + 0.03 * np.ptp(panel.x_range)
 
 
 def test_correlations_within_chance_are_grey():

@@ -147,13 +147,13 @@ def test_grid_is_accepted_when_first_runs_are_rejected():
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"runs": 40_000_000_000}, "--runs 40000000000: expected a number from 1 to 10000000"),
-        ({"runs": 0}, "--runs 0: expected a number from 1 to 10000000"),
-        ({"seed": 0}, "--seed 0: expected a whole number from 1 to 2147483647"),
-        ({"design": "halton"}, "--design halton: expected one of random, lhs, sobol, grid"),
-        ({"design": "lhs"}, "--design lhs: expected a key that varies"),
-        ({"design": "grid", "vary": {"a": uniform(0, 1)}}, r"--design grid: expected a key that varies by choice"),
-        ({"sweep": "none.csv"}, "--sweep none.csv: cannot be read: no such file"),
+        ({"runs": 40_000_000_000}, "runs 40000000000: expected a number from 1 to 10000000"),
+        ({"runs": 0}, "runs 0: expected a number from 1 to 10000000"),
+        ({"seed": 0}, "seed 0: expected a whole number from 1 to 2147483647"),
+        ({"design": "halton"}, "design halton: expected one of random, lhs, sobol, grid"),
+        ({"design": "lhs"}, "design lhs: expected a key that varies"),
+        ({"design": "grid", "vary": {"a": uniform(0, 1)}}, r"design grid: expected a key that varies by choice"),
+        ({"sweep": "none.csv"}, "sweep none.csv: cannot be read: no such file"),
     ],
 )
 def test_invalid_plan_is_rejected(arguments, message):

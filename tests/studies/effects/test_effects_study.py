@@ -19,6 +19,7 @@ from lapwing.studies.effects.cost import Cost
 from lapwing.studies.effects.procedure import Influence, Row, Study, _smallest, influence
 from lapwing.studies.effects.procedure import study as run_study
 from lapwing.studies.effects.variants import Change, changes, check_effects, fly_for_truth, tables_of, variant
+from lapwing.views.report.plot import Line
 from lapwing.views.studies import effects_result
 from lapwing.views.studies.study_result import show, write_json, write_plot
 from lapwing.views.terminal import console
@@ -243,6 +244,13 @@ def test_table_json_and_plot(tmp_path, capsys):
     assert data["rows"][0]["influence"]["trajectory"] is None
     write_plot(tmp_path / "study.png", page)
     assert (tmp_path / "study.png").read_bytes().startswith(b"\x89PNG")
+
+
+def test_legend_names_only_kinds_that_are_drawn():
+    plot = effects_result.result(study()).plots["Influence of effects"]()
+    (panel,) = plot.panels
+    legend = [mark.name for mark in panel.marks if isinstance(mark, Line)]
+    assert legend == ["needed", "(missing)", "(not needed)", "tolerance 0.01 m"]
 
 
 def test_table_of_fleet_names_vehicles(capsys):
