@@ -45,7 +45,7 @@
       return { name, k, table, corners, at: at ?? centre(corners), top, heading: [c, s] };
     }));
     const wind = WINDS.map((name) => ({ name, value: read(name) })).find(({ value }) => numbers(value));
-    return { start: numbers(start) ? start : [0, 0], points: points?.every?.(numbers) ? points : null, areas, wind };
+    return { start: numbers(start) ? start : [0, 0], points: points?.every?.((point) => numbers(point) && point.length > 2) ? points : null, areas, wind };
   }
 
   let scale = 1, shift = [0, 0], middle = [0, 0], reach = 5, held = null, tool = null;
