@@ -15,7 +15,7 @@ PLACED = (
     "trajectory.waypoints=[[0, 0, 3], [6, 0, 3], [7, 5, 4], [1, 6, 4]]",
     'environment.terrain.box=[{position = [8, -1], size = [2, 1.5], top = 2.5, name = "depot"}]',
     "fence.keep_in=[{corners = [[-3, -3], [10, -3], [10, 9], [-3, 9]]}]",
-    "fence.keep_out=[{position = [2.5, 3.2], radius = 1.8}]",
+    "fence.keep_out=[{position = [9, 6.5], radius = 1.2}]",
 )
 WIND = "effects.wind_constant.velocity=[2, 1, 0]"
 WAIT = """

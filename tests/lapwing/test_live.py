@@ -240,8 +240,14 @@ def test_keys_and_gamepad_of_the_page_become_sticks(tmp_path):
             const landed = await until("0,0,0,0");
             const pad = { connected: true, axes: [0, -0.5, 0.25, 0], buttons: [] };
             navigator.getGamepads = () => [null, pad];
-            return [before, flown.slice(0, 3), landed.includes("b land "), (await until("0,-0.25,0.5,0")).slice(-1)];
+            const taken = await until("0,-0.25,0.5,0");
+            pad.axes = [0, 0, 0, 0];
+            await until("0,0,0,0");
+            pad.axes = [0, -1, 0, 0];
+            const again = (await until("0,0,1,0")).filter((each) => !each.includes("manual")); // may be disarmed
+            return [before, flown.slice(0, 3), landed.includes("b land "), taken.slice(-1), again];
             """
         )
         assert browser.errors == []
-    assert found == [0, ["b position_control ", "b arm ", "b manual 1,0,0,1"], True, ["b manual 0,-0.25,0.5,0"]]
+    flown = ["b position_control ", "b arm ", "b manual 1,0,0,1"]
+    assert found == [0, flown, True, ["b manual 0,-0.25,0.5,0"], flown[:2]]

@@ -48,6 +48,7 @@ def test_error_above_published_value_is_marked():
     assert (error.value, error.limit, error.mark) == (pytest.approx(0.5), pytest.approx(0.03**0.5), "bad")
     assert largest.value == pytest.approx(0.5)
     assert largest.mark == ""
+    assert (error.text, error._replace(value=8.412e-5).text) == ("0.5 m", "0.0841 mm")
 
 
 def test_trouble_lists_faults_without_phases():

@@ -24,7 +24,7 @@ BLIND = {
     "protanopia": [[0.152286, 1.052583, -0.204868], [0.114503, 0.786281, 0.099216], [-0.003882, -0.048116, 1.051998]],
 }
 APART = 0.1  # distance in linear red, green, blue of two distinguishable colours
-PAPER = 703  # [pixel] width of A4 between its margins
+PAPER, SHEET = 703, 980  # [pixel] width and height of A4 between its margins
 MEAN, WORST = 8.0, 70.0  # of 255: mean difference of pixels, and its 99th percentile; fonts differ
 
 
@@ -75,11 +75,12 @@ def test_plots_fit_on_paper_and_in_the_window_again(tmp_path):
         browser.run(page_looks.DRAWN)
         window = browser.run(widths)
         browser.run("dispatchEvent(new Event('beforeprint')); await new Promise((done) => setTimeout(done, 2000));")
-        paper = browser.run(widths)
+        paper, tall = browser.run(widths), browser.run(widths.replace("width", "height"))
         browser.run("dispatchEvent(new Event('afterprint')); await new Promise((done) => setTimeout(done, 2000));")
         again = browser.run(widths)
         assert browser.errors == []
     assert max(paper) <= PAPER
+    assert max(tall) <= SHEET
     assert len(paper) > len(window)  # those of closed sections, too
     assert max(again) == max(window)
 

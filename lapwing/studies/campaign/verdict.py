@@ -95,7 +95,7 @@ def verdict(results: Results) -> str:
     share = percent(results.failure)
     own = [row for row in criteria(results) if row.text not in Success().require or row.failures]
     text = f"{failures} of {n} runs fail, {share}"
-    if own:
+    if own and failures:
         text += f": {', '.join(f'{row.failures} by {row.text}' for row in own)}"
     metric = subject(results)
     causes = [_cause(driver) for driver in drivers(results, metric)][:LISTED]

@@ -54,7 +54,7 @@ class LiveFeed:
         for step in steps:
             step.others = tuple(other for other in steps if other is not step)
         events_of_step = [new_events(step, self._after) for step in steps]
-        self._after = float(steps[0].truth.times[-1])
+        self._after = watch.time_ns * 1e-9  # all messages up to it have arrived; the truth may end earlier
         for step, events in zip(steps, events_of_step, strict=True):
             for time_ns, payload in event_messages(events):
                 watch.publish(EVENTS.name.format(vehicle=step.vehicle), time_ns, payload)

@@ -1,5 +1,7 @@
 """Time span, phases and setpoint of a flight, shared by all report plots."""
 
+from collections.abc import Iterator
+
 import numpy as np
 
 from lapwing.flights.flight_data import FlightData
@@ -37,6 +39,13 @@ def runs(t: np.ndarray, values: np.ndarray) -> list[tuple[str, float, float]]:
     return [(str(values[k]), float(t[k]), float(end)) for k, end in zip(starts, ends, strict=True)]
 
 
+def _stretches(armed: np.ndarray) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield the rows of each uninterrupted stretch with armed motors, and their numbers among all armed rows."""
+    rows = np.flatnonzero(armed)
+    for part in np.split(np.arange(len(rows)), np.flatnonzero(np.diff(rows) > 1) + 1):
+        yield rows[part], part
+
+
 def three_axes(flight: FlightData, first: int, actual: np.ndarray, unit: str, scale: float, caption: str) -> Plot:
     """Plot three axes over time, one per row, with the tracking error if there is a setpoint.
 
@@ -61,10 +70,11 @@ def three_axes(flight: FlightData, first: int, actual: np.ndarray, unit: str, sc
         panels.append(Panel(tuple(marks), f"{name} [{unit}]", row=row))
         if has_errors:
             rmse = scale * flight.rmse[name]
-            error = Line(t[:n][flight.armed], scale * flight.errors[name], width=1.0)
+            values = scale * flight.errors[name]
+            errors = [Line(t[rows], values[part], width=1.0) for rows, part in _stretches(flight.armed)]
             bounds = Level(rmse, "± RMSE"), Level(-rmse, "± RMSE")
             title = f"RMSE {rmse:.4f} {unit}"
-            panels.append(Panel((error, *bounds), f"{name} error [{unit}]", title=title, row=row, column=1))
+            panels.append(Panel((*errors, *bounds), f"{name} error [{unit}]", title=title, row=row, column=1))
     if has_errors:
         caption += " On the right: reference minus truth while the motors are armed."
     widths = (1.0, 1.0) if has_errors else (1.0,)

@@ -36,6 +36,12 @@ class KeyNumber(NamedTuple):
         return "warn" if self.value <= self.worst else "bad"
 
     @property
+    def text(self) -> str:
+        """Value with its unit; a length below 1 cm in millimetres."""
+        small = self.unit == "m" and 0.0 < self.value < 0.01
+        return f"{1e3 * self.value:.3g} mm" if small else f"{self.value:.3g} {self.unit}"
+
+    @property
     def comparison(self) -> str:
         """Value relative to the limit as text, e.g. "within 0.35 m (source)"; "" without a limit."""
         if self.limit is None:

@@ -3,7 +3,8 @@
   const config = { responsive: true, displaylogo: false, scrollZoom: false, toImageButtonOptions: { format: "svg" } };
   Object.assign(config, { modeBarButtonsToRemove: ["select2d", "lasso2d", "autoScale2d"], displayModeBar: matchMedia("(hover: hover)").matches && "hover" });
   const NARROW = 600; // [pixel] width below which a plot has one column
-  const PAPER = 690; // [pixel] width of a plot on a page of A4
+  const PAPER = 690, SHEET = 900; // [pixel] width and height of a plot on a page of A4
+  const COLUMN = 230; // [pixel] width that a column of panels needs; on paper, a plot is scaled down for that
   const dark = DARK_COLOURS;
   const AROUND = [5, 10]; // [s] shown before and after a selected event
   const linked = []; // drawn plots over time: {box, axis}
@@ -52,16 +53,21 @@
     }
   }
 
-  async function draw(figure) {
-    if (figure.dataset.drawn) return;
-    figure.dataset.drawn = "yes";
+  const drawn = new Map(); // promises of the plots
+  function draw(figure) {
+    if (!drawn.has(figure)) drawn.set(figure, begin(figure));
+    return drawn.get(figure);
+  }
+  async function begin(figure) {
     const { data, layout, timed, narrow } = JSON.parse(coloured(texts.get(figure) ?? (await unpacked(figure.querySelector("script")))));
     if (narrow && figure.clientWidth < NARROW) stack(layout, narrow);
     for (const trace of data) for (const axis of ["x", "y"]) trace[axis] = numbers(trace[axis]);
     const box = figure.querySelector("div");
     if (range) for (const axis of timed) layout[axis].range = range.slice();
+    if (printing) onPaper(figure, layout);
     await library;
     await Plotly.newPlot(box, data, layout, config);
+    figure.dataset.drawn = "yes";
     if (!timed.length) return;
     const plot = { box, timed, axis: timed[0], panels: timed.map((axis) => `${axis}${axis.replace("x", "y")}`.replaceAll("axis", "")) };
     linked.push(plot);
@@ -123,17 +129,26 @@
     place?.scrollIntoView({ block: "center", behavior: "smooth" });
   });
 
-  function fit(width) { // fits the plots to a width [pixel], or to the window again
+  let printing = false;
+  function onPaper(figure, layout) { // scales a plot to a page; returns its width before
+    const columns = new Set(Object.entries(layout).filter(([key]) => key.startsWith("xaxis")).map(([, axis]) => axis.domain[0])).size;
+    const width = Math.max(PAPER, COLUMN * columns, PAPER * layout.height / SHEET);
+    Object.assign(figure.style, { width: `${width}px`, zoom: PAPER / width });
+    return width;
+  }
+  function fit(paper) { // fits the plots to paper, or to the window again
+    printing = paper;
     for (const figure of figures) {
       const box = figure.querySelector("div");
-      figure.style.width = width ? `${width}px` : "";
-      if (!box.data) draw(figure);
-      else Plotly.relayout(box, width ? { width } : { width: null, autosize: true });
+      const resize = () => Plotly.relayout(box, printing ? { width: onPaper(figure, box.layout) } : { width: null, autosize: true });
+      if (!paper) Object.assign(figure.style, { width: "", zoom: "" });
+      if (figure.dataset.drawn) resize();
+      else draw(figure).then(resize);
     }
   }
   window.addEventListener("beforeprint", () => {
     for (const details of document.querySelectorAll("details")) details.open ||= !details.contains(space);
-    fit(PAPER);
+    fit(true);
   });
-  window.addEventListener("afterprint", () => fit(0));
+  window.addEventListener("afterprint", () => fit(false));
 })();

@@ -116,7 +116,7 @@ def _cover(cover: Cover) -> Figure:
     y -= 0.4 * line
     for label, number in cover.numbers:
         figure.text(left, y - 0.1 * line, label, va="top", fontsize=9, color="#555555")
-        value = f"{number.value:.3g} {number.unit}"
+        value = number.text
         figure.text(left + 0.33, y, value, va="top", fontsize=11, fontweight="bold", color=TEXT)
         colour = BOUND if number.mark in ("warn", "bad") else "#555555"
         figure.text(left + 0.46, y - 0.1 * line, number.comparison, va="top", fontsize=9, color=colour)

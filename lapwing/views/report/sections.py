@@ -141,10 +141,15 @@ def _both(
     shared = [m for m in shared if not isinstance(m, Stretch) or ours[m.lane] == others[m.lane]]
     mine = [m if any(_same(m, s) for s in shared) else _of(m, labels[0], FIRST, "solid", named[0]) for m in panel.marks]
     theirs = [_of(m, labels[1], SECOND, "dot", named[1]) for m in other.marks if not any(m is s for s in shared)]
-    ranges = [p.y_range for p in (panel, other) if p.y_range]
-    y_range = (min(low for low, _ in ranges), max(high for _, high in ranges)) if len(ranges) == 2 else None
+    x_range, y_range = _union(panel.x_range, other.x_range), _union(panel.y_range, other.y_range)
     title, note = _texts(panel.title, other.title, labels, "; "), _texts(panel.note, other.note, labels, "\n")
-    return panel._replace(marks=(*mine, *theirs), y_range=y_range, title=title, note=note)
+    return panel._replace(marks=(*mine, *theirs), x_range=x_range, y_range=y_range, title=title, note=note)
+
+
+def _union(*ranges: tuple[float, float] | None) -> tuple[float, float] | None:
+    """Return the range that contains all ranges; None if one is None."""
+    known = [each for each in ranges if each]
+    return (min(low for low, _ in known), max(high for _, high in known)) if len(known) == len(ranges) else None
 
 
 def _texts(one: str, other: str, labels: tuple[str, str], between: str) -> str:

@@ -64,6 +64,8 @@ def draw_points(axes: Axes, points: list[Point], goal: float | None, selected: P
     if selected is not None:
         spot = 1e3 * selected.time, max(selected.error, SMALLEST)
         axes.plot(*spot, "o", markersize=13, markerfacecolor="none", markeredgecolor=TEXT, zorder=4)
+    if len(labelled) < len(curves):
+        axes.text(0.01, 0.02, "grey: other methods", transform=axes.transAxes, fontsize=9.5, color="#555555")
     _label(axes, {name: curves[name] for name in labelled}, selected)
 
 

@@ -50,6 +50,8 @@ def criteria_plot(results: Results) -> Plot:
     metric = subject(results)
     caption = f"Runs that miss each criterion, of {len(results)}."
     if metric == ANY or metric not in results.figures:
+        if largest == 0.0:
+            raise NotRecordedError("no run fails")
         return Plot((shares,), caption, 0.9 + 0.4 * len(bars))
     caption += f" Right: share of runs with a smaller {metric}, which decides most failures or is nearest to its limit."
     (panel,) = _distributions(results, [metric], "").panels

@@ -26,7 +26,7 @@ def result(results: Sequence[Result]) -> StudyResult:
         plots[each.case] = partial(_plot, each.figures.plot)
         if each.sweep:
             title = f"{each.case}: difficulty at which each method breaks"
-            plots[title] = partial(_plot, each.sweep.plot(), "; ".join(_breaks(each.sweep)))
+            plots[title] = partial(_plot, each.sweep.plot())
     return StudyResult(
         f"Numerical stability: {counted(len(results), 'hard case')}", verdict, "bad" if failing else "good",
         ("each result with its bound, and the result of a baseline method on the same case",),
@@ -63,13 +63,15 @@ def _rows(each: Result) -> Rows:
 
 def _breaks(sweep: Sweep) -> list[str]:
     """Return for each method the difficulty at which it breaks."""
+    hint = " (smaller is harder)" if sweep.falling else ""
     return [
-        f"{name} {'holds in the whole sweep' if limit is None else f'breaks at {sweep.difficulty} = {_number(limit)}'}"
+        f"{name} "
+        + ("holds in the whole sweep" if limit is None else f"breaks at {sweep.difficulty} = {_number(limit)}{hint}")
         for name, limit in sweep.breaks().items()
     ]
 
 
-def _plot(plot: Plot, caption: str = "") -> report_plot.Plot:
+def _plot(plot: Plot) -> report_plot.Plot:
     marks: list[report_plot.Mark] = [
         report_plot.Line(np.asarray(x, float), np.asarray(y, float), name, COLOURS[k % len(COLOURS)])
         for k, (name, x, y) in enumerate(plot.curves)
@@ -77,7 +79,7 @@ def _plot(plot: Plot, caption: str = "") -> report_plot.Plot:
     if plot.bound is not None and not (plot.log_y and plot.bound <= 0.0):
         marks.append(report_plot.Level(plot.bound, f"bound {plot.bound:.2g}"))
     panel = report_plot.Panel(tuple(marks), plot.y_label, plot.x_label, timed=False, log_x=plot.log_x, log_y=plot.log_y)
-    return report_plot.Plot((panel,), caption, 3.4)
+    return report_plot.Plot((panel,), "", 3.4)
 
 
 def _number(value: float) -> str:

@@ -192,7 +192,7 @@ class _Reader:
         if len(text) > LONGEST:
             return []
         part = self._alternative(part, value)
-        if key in FIXED or len(part.get("enum", ())) == 1 or (value is None and part.get("type") == "object"):
+        if key in FIXED or len(part.get("enum", ())) == 1 or (value is None and _is_table(part)):
             return []  # no choice, or a missing table
         unit, meaning = _split(part)
         unit = _CHANNEL_UNIT.sub(channel_unit, unit)
@@ -238,6 +238,11 @@ def _fits(choice: Schema, value: Any) -> bool:
         return isinstance(value, dict) and value.get("kind") in kind
     types = {dict: "object", list: "array", str: "string", bool: "boolean", int: "integer", float: "number"}
     return choice.get("type") == types.get(type(value)) or (type(value) is int and choice.get("type") == "number")
+
+
+def _is_table(part: Schema) -> bool:
+    """Return True for the schema of a table, also one that `false` switches off, or of a list of tables."""
+    return "object" in part.get("type", ()) or (part.get("type") == "array" and _is_table(part.get("items", {})))
 
 
 def _is_tables(value: Any) -> bool:

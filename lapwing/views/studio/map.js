@@ -45,9 +45,10 @@
       return { name, k, table, corners, at: at ?? centre(corners), top, heading: [c, s] };
     }));
     const wind = WINDS.map((name) => ({ name, value: read(name) })).find(({ value }) => numbers(value));
-    return { start: numbers(start) ? start : [0, 0], points: points?.every?.(numbers) ? points : null, areas, wind };
+    return { start: numbers(start) ? start : [0, 0], points: points?.every?.((point) => numbers(point) && point.length > 2) ? points : null, areas, wind };
   }
 
+  const labels = []; // attributes and texts, drawn above everything else
   let scale = 1, shift = [0, 0], middle = [0, 0], reach = 5, held = null, tool = null;
   const pixel = (place) => flat(place).map((value, k) => shift[k] + scale * value);
   const make = (kind, attributes, label = "") => {
@@ -65,7 +66,7 @@
   };
   function handle(place, css, label, onMove, onRemove, onGrab) {
     const [cx, cy] = pixel(place), dot = make("circle", { cx, cy, r: css.startsWith("edge") ? 6 : 10, class: `handle ${css}` });
-    if (label) make("text", { x: cx + 13, y: cy + 4 }, label);
+    if (label) labels.push([{ x: cx + 13, y: cy + 4 }, label]);
     dot.removeShape = onRemove; // a double click is dispatched to the SVG, which has captured the pointer
     dot.onpointerdown = (event) => {
       onGrab?.();
@@ -121,7 +122,7 @@
     make("text", { x: 8, y: HEIGHT - 8 }, `${step} m between the lines`);
     for (const [at, label] of [[[cx + reach, cy], "east"], [[cx, cy + reach], "north"]]) {
       const [x, y] = pixel(at);
-      make("text", { x, y, "text-anchor": "middle" }, label);
+      labels.push([{ x, y, "text-anchor": "middle" }, label]);
     }
     const height = Math.max(3, ...(points ?? []).map(([, , z]) => z)); // [m] of the drawn fence
     areas.forEach((area) => drawArea(area, height));
@@ -138,6 +139,7 @@
       handle(tip, "wind", `wind ${Math.hypot(u, v).toFixed(1)} m/s`,
         ([x, y]) => write(wind.name, [...rounded((x - foot[0]) / WIND, (y - foot[1]) / WIND), w]));
     }
+    for (const [place, label] of labels.splice(0)) make("text", place, label);
   }
 
   const ground = ({ clientX, clientY }) => { // point of the ground below the mouse

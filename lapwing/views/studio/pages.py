@@ -18,7 +18,7 @@ from lapwing.cosim.scene import SceneError
 from lapwing.services.common.schemas.run_schema import Run, title
 from lapwing.views import report
 from lapwing.views.report.flight_header import differences
-from lapwing.views.studio.form_fields import additions, form
+from lapwing.views.studio.form_fields import PLACED, additions, form
 from lapwing.views.studio.recent_flights import RecentFlights
 from lapwing.views.studio.run_processes import StudioRuns
 from lapwing.views.studio.scene_forms import (
@@ -153,6 +153,7 @@ class Pages:
             groups=form(base, schema()),
             additions=additions(base, schema()),
             added=added,
+            placed=PLACED,
             texts=texts,
             faults=dict(faults or {}),
             error=error,

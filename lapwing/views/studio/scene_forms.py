@@ -14,6 +14,7 @@ from starlette.requests import Request
 from lapwing.cosim.scene import Scene, SceneError
 from lapwing.cosim.scene.overrides import with_values
 from lapwing.cosim.scene.toml_text import dump, toml
+from lapwing.dynamics import units
 from lapwing.file_schemas.annotations import Schema
 from lapwing.file_schemas.json_schema import scene_schema
 from lapwing.services.common.schemas.run_schema import SHIPPED
@@ -84,6 +85,8 @@ def _value(field: Field, text: str) -> Any:
     """Return the value of a text in the form. Raise ValueError if it does not fit the field's kind."""
     if field.kind == "text" or (field.kind == "choice" and not _is_word(text)):
         return text
+    if field.kind == "number" and units.parse(text, field.unit.replace("²", "^2").replace("³", "^3")) is not None:
+        return text  # with a unit
     try:
         (value,) = tomllib.loads(f"value = {text}").values()
     except (ValueError, RecursionError):  # invalid TOML, or more than one value
@@ -182,7 +185,9 @@ def form_changes(
             return changed, faults, message
         except SceneError as error:
             message = message or str(error)
-            before, remaining = remaining, [change for change in remaining if change.key != error.key]
-            if error.key not in fields or len(remaining) == len(before):
+            key = next((key for key in fields if f"{error.key}.".startswith(f"{key}.")), "")
+            before, remaining = remaining, [change for change in remaining if change.key != key]
+            if len(remaining) == len(before):
                 return changed, faults, message
-            faults[error.key] = error.sentence
+            entry = error.key.removeprefix(key)  # of a list
+            faults[key] = f"{key.rpartition('.')[2]}{entry}: {error.sentence}" if entry else error.sentence

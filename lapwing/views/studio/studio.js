@@ -86,7 +86,9 @@
       clearTimeout(timer);
       timer = setTimeout(preview, 250);
     });
-    document.querySelector("#add")?.addEventListener("change", ({ target }) => {
+    document.querySelector("#add")?.addEventListener("change", async ({ target }) => {
+      clearTimeout(timer);
+      await preview(); // marks what was changed just now
       const changed = all(".field.changed", form).map((field) => {
         const input = field.querySelector("[name]");
         return ["set", `${input.name}=${input.value}`];
@@ -132,7 +134,7 @@
         if (state.time) {
           time.textContent = `${state.time.toFixed(1)} s simulated, ${state.rate.toFixed(1)} times real time`;
           bar.style.width = `${Math.min(100, (100 * state.time) / Number(run.dataset.duration))}%`;
-        } else if (state.live) time.textContent = "flying";
+        }
         output.textContent = state.lines.join("\n");
       }
       setTimeout(poll, 500);

@@ -9,11 +9,11 @@
   const BUTTONS = ["KeyT", "KeyL", "KeyR", "KeyP"]; // A or cross, B or circle, X or square, Y or triangle
   const PERIOD = 50, FREE = 0.1; // [ms] between two messages; deflection that takes over
   const held = new Set(), pressed = new Set();
-  let flown = null, flying = false, asked = Promise.resolve(); // vehicle with sticks; whether they fly it; last message
+  let flown = null, flying = false, moved = false, asked = Promise.resolve(); // vehicle with sticks; whether they fly it; last message
 
   function send(kind, values = []) { // one after the other, so that they keep their order
     const query = new URLSearchParams({ vehicle: flown, kind, values });
-    asked = asked.then(() => fetch(`sticks?${query}`)).catch(() => {});
+    asked = asked.then(() => fetch(`sticks?${query}`)).catch(() => (flown = null)); // the flight is over
     return asked;
   }
   function command(code) {
@@ -35,9 +35,10 @@
     return result.map((value) => Math.round(1e3 * Math.max(-1, Math.min(1, value))) / 1e3);
   }
   async function poll() {
-    const values = sticks(), moved = values.some((value) => Math.abs(value) > FREE);
-    if (moved && !flying && facts.sticks.includes(facts.names[view.vehicle])) {
-      flown = facts.names[view.vehicle];
+    const values = sticks(), pushed = !moved && values.some((value) => Math.abs(value) > FREE), viewed = facts.names[view.vehicle];
+    moved = values.some((value) => Math.abs(value) > FREE);
+    if (pushed && (flying || facts.sticks.includes(viewed))) { // again at each push: on the ground the autopilot disarms
+      if (!flying) flown = viewed;
       flying = true;
       send("position_control");
       send("arm");
@@ -57,7 +58,7 @@
   addEventListener("blur", () => held.clear());
   addEventListener("DOMContentLoaded", () => {
     const help = document.createElement("span");
-    help.textContent = "arrows W A S D or gamepad: fly; T take off, L land, R return";
+    help.textContent = "T take off; arrows move; W S up, down; A D turn; L land; R return; P hover; or a gamepad";
     document.getElementById("lapwing").append(help);
     poll();
   });

@@ -49,6 +49,7 @@
     const style = document.createElement("style");
     style.textContent = `.mantine-Notifications-root { display: none }
       .mantine-Input-input:disabled { opacity: 1 !important; color: inherit !important; background: none !important; border: 0; cursor: auto }
+      .mantine-Flex-root:has(> div > .mantine-Textarea-root) { display: block !important } /* the events below their label */
       textarea.mantine-Textarea-input:disabled { min-height: 55vh; max-height: none; font-variant-numeric: tabular-nums }
       #lapwing { position: fixed; top: 10px; left: 10px; max-width: calc(100% - 20px); box-sizing: border-box; z-index: 5; display: flex; flex-wrap: wrap; gap: 8px; align-items: center;
         font: 13px system-ui, sans-serif; color: #1f2328; background: #ffffffd9; border-radius: 6px; padding: 6px 10px }
@@ -61,6 +62,11 @@
       #lapwing i { display: inline-block; width: 90px; height: 8px; border-radius: 4px;
         background: linear-gradient(90deg, #004c8c, #008eaa, #56b46e, #deba28, #e06e14) }
       #lapwing u { text-decoration: none; display: inline-block; width: 10px; height: 10px; border-radius: 5px }
+      @media (min-width: 601px) { #lapwing.live { max-width: calc(100% - 350px) } } /* beside the panel */
+      @media (max-width: 600px) {
+        .mantine-Paper-root { max-height: 35% !important; max-width: 100% }
+        textarea.mantine-Textarea-input:disabled { min-height: 12vh }
+      }
       @media (prefers-color-scheme: dark) {
         #lapwing { color: #e6eaee; background: #14181dd9 }
         #lapwing select { background: #1d232a; border-color: #39424c }
@@ -68,6 +74,7 @@
     document.head.append(style);
     const bar = document.createElement("div");
     bar.id = "lapwing";
+    bar.className = facts.live ? "live" : "";
     const label = (...parts) => bar.appendChild(document.createElement("span")).append(...parts);
     const modes = ["follow", "orbit", "top", "onboard"];
     bar.append(select("camera", modes, (k) => view.look(modes[k])));

@@ -4,7 +4,7 @@ import numpy as np
 from circle_report import Page, messages, record
 
 from lapwing.flights.flight_data import FlightData
-from lapwing.views.report import write
+from lapwing.views.report import flight_phases, write
 from lapwing.views.report.flight_header import MANY, differences
 from lapwing.views.report.plot import Line, Panel, Plot
 from lapwing.views.report.plots import position
@@ -53,3 +53,17 @@ def test_keys_in_which_two_scenes_differ():
     many = differences({str(k): k for k in range(MANY + 3)}, {})
     assert len(many) == MANY + 1
     assert "3 more" in many
+
+
+def test_map_shows_both_flights_and_errors_only_armed_time():
+    maps = [
+        Plot((Panel((Line(np.zeros(2), np.zeros(2)),), x_range=(-side, 1.0), y_range=(-1.0, side)),), "", 1.0)
+        for side in (1.0, 134.0)
+    ]
+    (panel,) = overlay(*maps, ("near", "far")).panels
+    assert (panel.x_range, panel.y_range) == ((-134.0, 1.0), (-1.0, 134.0))
+    armed = np.array([False, True, True, False, False, True])
+    assert [(list(rows), list(part)) for rows, part in flight_phases._stretches(armed)] == [
+        ([1, 2], [0, 1]),
+        ([5], [2]),
+    ]

@@ -72,6 +72,7 @@ def test_tables_that_scene_lacks_can_be_added(schema):
     names = dict(additions(scene, schema))
     assert "effects.battery" in names
     assert "effects.gravity" not in names
+    assert not names.keys() & fields("hover", schema).keys()
     added = load("hover", {"effects.random_wind_force": {}})
     by_key = {field.key for group in form(added, schema) for field in group.all_fields()}
     assert "effects.random_wind_force.mean" in by_key
@@ -106,6 +107,7 @@ def test_texts_become_values_of_field(schema):
     posted = {
         "run.seed": "2",
         "run.duration": "30",
+        "run.stop_delay": "500 ms",
         "effects.random_wind_force.mean": "[1, 2.5, 0]",
         "sensors.gps.preset": "standard",
         "trajectory.phase.1.z.to": "8",
@@ -117,6 +119,7 @@ def test_texts_become_values_of_field(schema):
         "effects.battery": {},
         "run.seed": 2,
         "run.duration": 30.0,
+        "run.stop_delay": "500 ms",
         "effects.random_wind_force.mean": [1, 2.5, 0],
         "sensors.gps.preset": "standard",
         "trajectory.phase.1.z.to": 8.0,
@@ -124,7 +127,7 @@ def test_texts_become_values_of_field(schema):
     }
     scene = load("delivery_mission", [change.override for change in changed])
     assert scene == load("delivery_mission", dict(changed))
-    assert scene.lookup("run.seed") == 2
+    assert (scene.lookup("run.seed"), scene.lookup("run.stop_delay")) == (2, 0.5)
 
 
 @pytest.mark.parametrize(
@@ -154,6 +157,8 @@ def test_all_faults_of_form_are_named_at_once():
         "effects.random_wind_force.sigma": "99.0",
     }
     assert message
+    _, faults, _ = forms.form_changes("hover", {"trajectory.waypoints": "[[0, 0, 3], [7, 0]]"}, ())
+    assert faults["trajectory.waypoints"].startswith("waypoints.1: expected x, y, z [m]")
 
 
 def test_command_line_and_python_fly_same():

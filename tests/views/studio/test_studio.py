@@ -152,7 +152,7 @@ def flown(studio):
     for number, changed in enumerate(({}, {"run.seed": "2", "trajectory.phase.0.z.to": "1.5"}), 1):
         status, _, headers = studio.request("scenes/hover/run", {**QUICK, **changed})
         assert (status, headers["Location"]) == (303, f"/{studio.token}/runs/{number}")
-        assert "hover is flying" in studio.page("") or '"running":false' in studio.page(f"runs/{number}/state")
+        assert "hover is running" in studio.page("") or '"running":false' in studio.page(f"runs/{number}/state")
         pages.append(studio.wait(number))
     return pages
 

@@ -225,6 +225,8 @@ def test_user_drags_waypoint_building_start_and_wind(start, tmp_path):
             mouse.drag(f"#map {what}", 25, 0)
         tables = changed_tables(user, 4, "wind_constant")
         assert "--set 'trajectory.waypoints=" in user.do("return one('#command').textContent")
+        user.do("type('trajectory.waypoints', '[[0.0, 0.0, 3.0], [7.0, 0.0]]');")  # not yet complete
+        user.do("await until(() => key('trajectory.waypoints').querySelector('.fault').textContent);")
         assert browser.errors == []
     before = tomllib.loads(scene.read_text())
     first, *others = tables["trajectory"]["waypoints"]
