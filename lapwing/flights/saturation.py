@@ -74,12 +74,12 @@ def _limits(low: Any, high: Any, voltage: Any, flying: Any, least: float, most: 
 
 
 def description(low: np.ndarray, high: np.ndarray, highest: float) -> str:
-    """Return a text of the motors at each limit, given their flags, shape (n, motors): "motor 2 at 40 V"."""
+    """Return the motors at each limit by their flags, shape (n, motors), as text: "motor 2 at the limit of 40 V"."""
     limits = ((low, "0 V"), (high, f"{highest:g} V"))
     found = [(_motors(np.asarray(at.any(axis=0))), limit) for at, limit in limits if at.any()]
     if len(found) == 2 and found[0][0] == found[1][0]:
-        return f"{found[0][0]} at {found[0][1]} and {found[1][1]}"
-    return ", ".join(f"{motors} at {limit}" for motors, limit in found)
+        return f"{found[0][0]} at the limits of {found[0][1]} and {found[1][1]}"
+    return ", ".join(f"{motors} at the limit of {limit}" for motors, limit in found)
 
 
 def spans(result: Saturation, t: np.ndarray, highest: float) -> list[tuple[str, float, float]]:

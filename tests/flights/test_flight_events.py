@@ -16,7 +16,7 @@ SCENE = {
 
 
 def example_flight(voltage=None):
-    """Return a flight: up at 1 s, two motors at their limit for 0.2 s from 2 s on, a failsafe at 3 s, down at 4 s."""
+    """Return a flight: up at 1 s, two motors at the limit for 0.2 s from 2 s on, a failsafe at 3 s, down at 4 s."""
     flying = (T >= 1.0) & (T < 4.0)
     if voltage is None:
         voltage = np.full((TICKS, 4), 20.0)
@@ -55,7 +55,7 @@ def test_events_are_listed_in_order():
         (1.0, "contact", "leaves the ground"),
         (2.0, "fault", "gps loses its readings until 3 s"),
         (2.0, "phase", "hover"),
-        (2.0, "motors", "motors 1, 3 at 40 V for 0.20 s, 6.7 % of the time in the air"),
+        (2.0, "motors", "motors 1, 3 at the limit of 40 V for 0.20 s, 6.7 % of the time in the air"),
         (2.5, "fault", "rotor 2 keeps 30 % of its thrust"),
         (2.8, "fault", "motor 2: failure detected"),
         (3.0, "failsafe", "a motor has failed"),
@@ -76,14 +76,14 @@ def test_saturation_is_one_event_with_its_share():
     voltage[120:130, 0] = voltage[300:330, 2] = 40.0
     (event,) = [event for event in example_flight(voltage).events if event.kind == "motors"]
     assert event.time == 1.2
-    assert event.text == "motors 1, 3 at 40 V for 0.40 s (2 times), 13 % of the time in the air"
+    assert event.text == "motors 1, 3 at the limit of 40 V for 0.40 s (2 times), 13 % of the time in the air"
 
 
 def test_saturation_of_all_motors_is_named_once():
     voltage = np.full((TICKS, 4), 20.0)
     voltage[120:130], voltage[130:140] = 40.0, 0.0
     (event,) = [event for event in example_flight(voltage).events if event.kind == "motors"]
-    assert event.text == "all motors at 0 V and 40 V for 0.20 s, 6.7 % of the time in the air"
+    assert event.text == "all motors at the limits of 0 V and 40 V for 0.20 s, 6.7 % of the time in the air"
 
 
 def test_timeline_shows_each_span_of_saturation_with_its_share():
@@ -91,6 +91,6 @@ def test_timeline_shows_each_span_of_saturation_with_its_share():
     voltage[120:130, 0] = voltage[300:330, 2] = 40.0
     marks = [mark for mark in timeline.draw(example_flight(voltage)).panels[0].marks if mark.lane == "motor limit"]
     assert [(round(mark.start, 9), round(mark.end, 9), mark.text) for mark in marks] == [
-        (1.2, 1.3, "motor 1 at 40 V for 0.10 s, 3.3 % of the time in the air"),
-        (3.0, 3.3, "motor 3 at 40 V for 0.30 s, 10 % of the time in the air"),
+        (1.2, 1.3, "motor 1 at the limit of 40 V for 0.10 s, 3.3 % of the time in the air"),
+        (3.0, 3.3, "motor 3 at the limit of 40 V for 0.30 s, 10 % of the time in the air"),
     ]

@@ -72,8 +72,11 @@ def _outcome(tuning: Tuning) -> str:
     if tuning.failures:
         first, *others = tuning.failures
         return f"The new gains fail: {first}" + (f"; and {len(others)} more" if others else "")
-    corners = len(tuning.corners)
-    flights = f", and all {corners} flights of perturbed vehicles succeed" if corners else "; no flight was made"
+    flights = "; no flight was made"
+    if tuning.corners:
+        worst, figures = max(tuning.corners.items(), key=lambda item: item[1]["max_distance"])
+        error = f"with position errors up to {figures['max_distance']:.2g} m ({worst})"
+        flights = f", and all {len(tuning.corners)} flights of perturbed vehicles succeed, {error}"
     return f"The new gains pass: all {len(tuning.after.margins)} loops have their margins{flights}"
 
 

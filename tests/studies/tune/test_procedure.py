@@ -67,6 +67,8 @@ def test_page_and_tables(tuning, tmp_path):
     assert "Open loops" in page
     assert "rise time" in page  # legend of the numbers in the panels
     assert "mass +20 %, inertia -20 %, thrust -20 %" in page
+    worst = max(flight["max_distance"] for flight in tuning.corners.values())
+    assert f"vehicles succeed, with position errors up to {worst:.2g} m (" in page
     console = Console(record=True, width=80)
     show(console, tune_result(tuning))
     text = console.export_text()
