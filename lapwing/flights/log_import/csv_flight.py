@@ -62,7 +62,7 @@ def from_columns(
     offer("duty", duty, mapping.motors.columns, "", [("motor out of range", outside)])
     if duty.min() >= mapping.motors.unused_below > 0.0:
         channels.notes.append(
-            f"motors never below {duty.min():.0%}: other units are suspected; see motorOutput in the header"
+            f"motors never below {100.0 * duty.min():.0f} %: other units are suspected; see motorOutput in the header"
         )
     if (battery := mapping.battery) is not None:
         volts = table[battery.column] * SCALES[battery.unit]
@@ -94,7 +94,7 @@ def _time(path: Path, time: np.ndarray) -> np.ndarray:
         raise ValueError(f"{path}: all rows have the same time; check time.column in the mapping")
     if equal.mean() > MOST_EQUAL:
         raise ValueError(
-            f"{path}: {equal.mean():.0%} of the rows have the time of the row before; "
+            f"{path}: {100.0 * equal.mean():.0f} % of the rows have the time of the row before; "
             "its resolution is too low, check time.column in the mapping, or log a finer time"
         )
     return np.asarray(time - time[0])

@@ -18,7 +18,8 @@ def result(study: Study) -> StudyResult:
     """Return the result of a study of effects."""
     fleet = len(study.vehicles) > 1
     absent = "not in all vehicles" if fleet else "not in the scene"
-    saved = 1.0 - study.smallest_airborne / study.airborne, 1.0 - study.smallest_standing / study.standing
+    hovering = _share(study.airborne - study.smallest_airborne, study.airborne, study.noise[0]) or "nothing"
+    standing = _share(study.standing - study.smallest_standing, study.standing, study.noise[1]) or "nothing"
     steps = f"plant step of all {len(study.vehicles)} vehicles" if fleet else "plant step"
     rows = [(active, row) for active in (True, False) for row in _sorted_rows(study, active)]
     notes = ['Costs after "<" are below the resolution of the measurement.']
@@ -34,7 +35,7 @@ def result(study: Study) -> StudyResult:
         f"smallest set of effects within {study.within:g} m: {', '.join(study.smallest) or 'none'}",
         "",
         (
-            f"distance {study.distance:.2g} m; saves {saved[0]:.0%} of a step hovering, {saved[1]:.0%} on the ground",
+            f"distance {study.distance:.2g} m; saves {hovering} of a step hovering, {standing} on the ground",
             f"{absent.capitalize()}, influence above {study.within:g} m: {missing}",
             f"{steps}: {study.airborne:.0f} ns hovering, {study.standing:.0f} ns on the ground",
         ),
@@ -53,10 +54,15 @@ def _table(title: str, study: Study, active: bool) -> Rows:
     for row in _sorted_rows(study, active):
         if row.influence is None:
             continue
-        ratio = f"{row.airborne / study.airborne:.0%}" if row.airborne > study.noise[0] else ""
+        ratio = _share(row.airborne, study.airborne, study.noise[0])
         airborne, standing = _cost(row.airborne, study.noise[0]), _cost(row.standing, study.noise[1])
         rows.add(row.name.replace(".", "\n  ."), airborne, ratio, standing, *_changes(row.influence))
     return rows
+
+
+def _share(difference: float, whole: float, noise: float) -> str:
+    """Return the share of a cost; "" below the resolution of the measurement."""
+    return f"{100.0 * difference / whole:.0f} %" if difference > noise else ""
 
 
 def _cost(difference: float, noise: float) -> str:
