@@ -14,7 +14,7 @@ from lapwing.flights.log_import.source_choice import Choices
 from lapwing.flights.rotation_arrays import from_xyzw
 
 MOST_EQUAL = 0.9  # largest share of rows with the time of the row before
-WHOLE = 1e-6  # largest distance of a rate [Hz] from a whole number
+GAP = 1.75  # times the median step, from which samples are missing
 
 
 def read_csv_flight(path: Path, mapping: Mapping, choices: Choices = Choices()) -> Recording:  # noqa: B008
@@ -101,10 +101,9 @@ def _time(path: Path, time: np.ndarray) -> np.ndarray:
 
 
 def _interval(time: np.ndarray) -> float:
-    """Return the time between two samples [s]: a second has a whole number of them, as of the ticks of a plant."""
-    median = float(np.median(np.diff(time)))
-    rounded = 1.0 / (round(median, 5) or median)  # the clock's jitter
-    return 1.0 / max(1, round(rounded if abs(rounded - round(rounded)) < WHOLE else 1.0 / median))
+    """Return the mean time between two samples [s] without gaps: a second has a whole number, as of a plant's ticks."""
+    steps = np.diff(time)
+    return 1.0 / max(1, round(1.0 / float(steps[steps < GAP * np.median(steps)].mean())))
 
 
 def _first(mask: np.ndarray) -> int:
