@@ -78,10 +78,9 @@ def main(seeds: int = 100, first: int = 1, linear: bool = False) -> None:
     else:
         z = np.array([complete(rows, flight, true) for flight in flights])
     for key, column in zip(KEYS, z.T, strict=True):
-        print(
-            f"{key}: {np.mean(np.abs(column) < 2.0):.0%} within 2, mean {column.mean():+.2f}, spread {column.std():.2f}"
-        )
-    print(f"all: {np.mean(np.abs(z) < 2.0):.1%} of {z.size}, {time.perf_counter() - begin:.0f} s")
+        within = 100.0 * np.mean(np.abs(column) < 2.0)
+        print(f"{key}: {within:.0f} % within 2, mean {column.mean():+.2f}, spread {column.std():.2f}")
+    print(f"all: {100.0 * np.mean(np.abs(z) < 2.0):.1f} % of {z.size}, {time.perf_counter() - begin:.0f} s")
 
 
 if __name__ == "__main__":

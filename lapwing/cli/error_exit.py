@@ -17,14 +17,23 @@ DIFFERENT = 3  # two logs, or a log and its digest, differ
 FLIGHT_FAILED = 4  # a criterion of the scene's `success.require` is not met
 
 
+def _option_of(key: str) -> str:
+    """Return "--set" if the user has given the key with it; "" for a key that another option overrides."""
+    typed = (text.removeprefix("--set=").partition("=")[0].strip() for text in sys.argv[1:])
+    return "--set" if key in typed else ""
+
+
 @contextmanager
 def user_errors() -> Iterator[None]:
     """Print errors as one line; exit with 2 for invalid input, with 1 for a failed run or a system error."""
     from lapwing.cosim.optional_packages import missing_in
     from lapwing.cosim.run_errors import BusError, LockStepError, RunFailed
+    from lapwing.cosim.scene import SceneError
 
     try:
         yield
+    except SceneError as error:
+        fail(str(error.with_option(_option_of)), USER_ERROR)
     except (ValueError, BusError) as error:
         fail(str(error), USER_ERROR)
     except (RunFailed, LockStepError) as error:

@@ -16,7 +16,7 @@ from lapwing.cosim.scene import Scene
 from lapwing.flights.flight_data import SHOWN
 from lapwing.flights.metrics import joint_end_state, metrics
 from lapwing.flights.separation import Separation, nearest
-from lapwing.flights.tracking import unit_and_factor
+from lapwing.flights.tracking import digits, unit_and_factor
 from lapwing.services.common.schemas.run_schema import Published
 from lapwing.services.common.schemas.success_criteria import Success
 from lapwing.studies.json_file import write_json
@@ -157,9 +157,9 @@ def _errors(console: Console, published: Published, rmse: dict[str, float]) -> N
         table.add_column(published.source, justify="right")
     for axis, value in rmse.items():
         unit, scale = unit_and_factor(axis)
-        row = [f"{axis} [{unit}]", f"{scale * value:.4f}"]
+        row = [f"{axis} [{unit}]", digits(scale * value)]
         if published.rmse:
-            row.append(f"{scale * published.rmse[axis]:.4f}" if axis in published.rmse else "")
+            row.append(digits(scale * published.rmse[axis]) if axis in published.rmse else "")
         table.add_row(*row)
     console.print(table)
 

@@ -111,7 +111,7 @@ def effects(
         raise ValueError(f"--tolerance {tolerance:g}: expected a distance above 0 m")
     screen = console()
 
-    with StudyProgress(screen, "flights") as progress:
+    with StudyProgress(screen, "parts") as progress:
         result = effects_result.result(study(load(scene, set_ or []), tolerance, progress.say, names))
     show(screen, result)
     if json:

@@ -285,7 +285,7 @@ def _empty_battery(flight: Flight, time: float) -> Iterator[Incident]:
         battery = flight.topic("battery")
         low = np.flatnonzero((battery.percentage < EMPTY) & (battery.times <= time))
         if len(low):
-            yield Incident(float(battery.times[low[0]]), f"the battery was empty: charge below {EMPTY:.0%}")
+            yield Incident(float(battery.times[low[0]]), f"the battery was empty: charge below {100.0 * EMPTY:.0f} %")
 
 
 def _runaway(flight: Flight, stop: int) -> list[Incident]:

@@ -18,6 +18,13 @@ def unit_and_factor(axis: str) -> tuple[str, float]:
     return ("°", 1.0 / DEGREE) if AXES[axis] == "rad" else ("m", 1.0)
 
 
+def digits(value: float) -> str:
+    """Return an error with four decimals, or three significant digits if it is small: 1.2345, 0.000214, 3.27e-09, 0."""
+    if not 0.0 < abs(value) < 1e-2:
+        return f"{value:.4f}" if value else "0"
+    return f"{value:.{2 - math.floor(math.log10(abs(value)))}f}" if abs(value) >= 1e-6 else f"{value:.2e}"
+
+
 def roll_pitch_yaw(xyzw: np.ndarray) -> np.ndarray:
     """Return roll, pitch, yaw [rad], shape (n, 3), of unit quaternions (n, 4); yaw without jumps."""
     result, cosines = np.empty((3, len(xyzw))), np.empty((2, len(xyzw)))

@@ -17,6 +17,15 @@ def test_roll_pitch_yaw_equal_scipy():
     assert np.cos(result[:, 2] - expected[:, 2]) == pytest.approx(1.0)
 
 
+@pytest.mark.parametrize(
+    ("value", "text"),
+    [(0.0, "0"), (12.345678, "12.3457"), (0.01, "0.0100"), (-2.136e-4, "-0.000214"), (3.2e-6, "0.00000320"),
+     (3.2745e-9, "3.27e-09"), (float("nan"), "nan")],
+)  # fmt: skip
+def test_small_errors_have_significant_digits(value, text):
+    assert tracking.digits(value) == text
+
+
 def test_angle_differences_are_wrapped():
     reference, attitude = np.zeros((3, 6)), np.zeros((3, 3))
     reference[:, 5] = (0.1, 3.0, -3.0)

@@ -20,10 +20,15 @@ PEERS = "plant=tcp/127.0.0.1:7001,autopilot=tcp/127.0.0.1:7002"
 OPEN = ("--endpoints", "foxglove=unixsock-stream/x")
 
 BAD = {
-    "unknown key": ([HOVER, "--set", "run.sed=1"], "override run.sed: unknown key 'sed'; did you mean seed?"),
+    "unknown key": ([HOVER, "--set", "run.sed=1"], "--set run.sed: unknown key 'sed'; did you mean seed?"),
     "own effect": ([HOVER, "--set", "effects.gravty={}"], 'an effect of your own needs `module = "FILE"`'),
+    "no value": ([HOVER, "--set=run.seed"], "--set run.seed: expected KEY=VALUE, for example solver.step=0.001"),
+    "key of another option": (
+        ["gyrostat_chaotic", "--shell", "--mode", "single-process"],
+        "override autopilot.shell: autopilot: the model gyrostat has no such table",
+    ),
     "no number": ([HOVER, "--run", "abc"], "--run abc: expected a valid integer (see lapwing run --help)"),
-    "list": ([HOVER, "--set", 'success.require="time"'], "override success.require: expected a list, got 'time'"),
+    "list": ([HOVER, "--set", 'success.require="time"'], "--set success.require: expected a list, got 'time'"),
     "success": ([HOVER, "--set", 'success.require=["tim < 3"]'], "unknown metric 'tim'; did you mean time?"),
     "no condition": ([HOVER, "--set", 'success.require=["rmse.z"]'], "'rmse.z' is a number, not true or false"),
     "unlike types": ([HOVER, "--set", "success.require=[\"'a' < 1\"]"], "is a text, '1' is a number"),
@@ -93,6 +98,9 @@ def test_invalid_run_is_rejected_in_one_line(lapwing, arguments, expected):
     ("arguments", "expected"),
     [
         (["check", "scenes/none.toml"], "no such file"),
+        (["accuracy", "hovr"], "unknown scene or problem 'hovr'; did you mean hover? expected a scene (see lapwing sc"),
+        (["accuracy", "heavy_to"], "unknown scene or problem 'heavy_to'; did you mean heavy_top? expected a scene"),
+        (["accuracy", "heavy_top", "--set", "run.seed=2"], "--set run.seed=2: heavy_top is a problem; expected a sc"),
         (["precompile", "scenes/none.toml"], "no such file"),
         (["precompile", "scenes/plans"], "scenes/plans: contains no scenes; expected a folder with .toml files"),
         (["scenes", "none"], "none: contains no scenes"),

@@ -1,5 +1,6 @@
 """Error in a scene: the key, the fault, and the origin of the key."""
 
+from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
 
@@ -32,6 +33,13 @@ class SceneError(ConfigError):
         super().__init__(key, message, expected)
         self.args = (key, message, expected, source)
         self.source = source
+
+    def with_option(self, option_of: Callable[[str], str]) -> "SceneError":
+        """Return the error with the name of the option that gave the override; `option_of` returns "" for others."""
+        if self.source.override is None or self.source.option != KeyOrigin().option:
+            return self
+        option = option_of(self.source.override.partition("=")[0].strip()) or self.source.option
+        return SceneError(self.key, self.message, self.expected, self.source._replace(option=option))
 
     def __str__(self) -> str:
         override = self.source.override

@@ -14,7 +14,7 @@ from lapwing.flights.log_import.source_choice import Choices
 from lapwing.flights.rotation_arrays import from_xyzw
 
 MOST_EQUAL = 0.9  # largest share of rows with the time of the row before
-WHOLE = 1e-6  # largest distance of a rate [Hz] from a whole number
+GAP = 1.75  # times the median step, from which samples are missing
 
 
 def read_csv_flight(path: Path, mapping: Mapping, choices: Choices = Choices()) -> Recording:  # noqa: B008
@@ -62,7 +62,7 @@ def from_columns(
     offer("duty", duty, mapping.motors.columns, "", [("motor out of range", outside)])
     if duty.min() >= mapping.motors.unused_below > 0.0:
         channels.notes.append(
-            f"motors never below {duty.min():.0%}: other units are suspected; see motorOutput in the header"
+            f"motors never below {100.0 * duty.min():.0f} %: other units are suspected; see motorOutput in the header"
         )
     if (battery := mapping.battery) is not None:
         volts = table[battery.column] * SCALES[battery.unit]
@@ -94,17 +94,16 @@ def _time(path: Path, time: np.ndarray) -> np.ndarray:
         raise ValueError(f"{path}: all rows have the same time; check time.column in the mapping")
     if equal.mean() > MOST_EQUAL:
         raise ValueError(
-            f"{path}: {equal.mean():.0%} of the rows have the time of the row before; "
+            f"{path}: {100.0 * equal.mean():.0f} % of the rows have the time of the row before; "
             "its resolution is too low, check time.column in the mapping, or log a finer time"
         )
     return np.asarray(time - time[0])
 
 
 def _interval(time: np.ndarray) -> float:
-    """Return the time between two samples [s]: a second has a whole number of them, as of the ticks of a plant."""
-    median = float(np.median(np.diff(time)))
-    rounded = 1.0 / (round(median, 5) or median)  # the clock's jitter
-    return 1.0 / max(1, round(rounded if abs(rounded - round(rounded)) < WHOLE else 1.0 / median))
+    """Return the mean time between two samples [s] without gaps: a second has a whole number, as of a plant's ticks."""
+    steps = np.diff(time)
+    return 1.0 / max(1, round(1.0 / float(steps[steps < GAP * np.median(steps)].mean())))
 
 
 def _first(mask: np.ndarray) -> int:

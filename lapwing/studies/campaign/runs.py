@@ -171,11 +171,8 @@ def name_option_in_errors(plan: Plan) -> Iterator[None]:
     try:
         yield
     except SceneError as error:
-        override = (error.source.override or "").partition("=")[0]
-        if argument := plan.argument(override):
-            source = error.source._replace(option=f"--{argument}")
-            raise SceneError(error.key, error.message, error.expected, source) from error.__cause__
-        raise
+        named = error.with_option(lambda key: f"--{argument}" if (argument := plan.argument(key)) else "")
+        raise named from error.__cause__
 
 
 def scene_of(plan: Plan) -> Scene:

@@ -123,11 +123,11 @@ def ratio_change(a: np.ndarray, b: np.ndarray) -> Interval:
 
 
 def percent(p: Interval, signed: bool = False) -> str:
-    """Return a share with its interval and the digits that the interval allows: "75 % (95 %: 68 to 81)"."""
+    """Return a share with its interval, in the digits that it allows: 75 % (95 % confidence interval 68 to 81)."""
     width = 100.0 * (p.high - p.low) / 2.0
     digits = min(max(0, math.ceil(-math.log10(width))), 9) if 0.0 < width < math.inf else 0
     value, low, high = (f"{100.0 * number:{'+' if signed else ''}.{digits}f}" for number in p)
-    return f"{value} % (95 %: {low} to {high})"
+    return f"{value} % (95 % confidence interval {low} to {high})"
 
 
 def ellipse(points: np.ndarray, share: float) -> np.ndarray:

@@ -91,9 +91,20 @@ def exchanges(
         s.value = multirotor.advance(method, p.value, key, tick, MultirotorState(x.motion, memory), command, h, n)
 
 
-def costs(scene: Scene, variants: list[Tables]) -> list[Cost]:
-    """Return the cost of a plant step of each variant."""
+def costs(scene: Scene, variants: list[Tables], report: Callable[[int], None] = lambda loaded: None) -> list[Cost]:
+    """Return the cost of a plant step of each variant.
+
+    Args:
+        scene: scene of multirotors.
+        variants: effects of each variant.
+        report: called with the number of variants whose kernels are compiled or loaded; then all are measured.
+    """
     calls = [_calls(variant(scene, tables)) for tables in variants]
+    for loaded, each in enumerate(calls):
+        report(loaded)
+        for call in (call for _, *pair in each for call in pair):
+            call()
+    report(len(calls))
     times = [np.empty((ROUNDS, len(each), 2)) for each in calls]
     for i in range(ROUNDS):
         for each, rows in zip(calls, times, strict=True):
@@ -105,7 +116,7 @@ def costs(scene: Scene, variants: list[Tables]) -> list[Cost]:
 def _cost(times: np.ndarray, numbers: list[int]) -> Cost:
     """Return the cost from the times [s] of each round and distinct vehicle, in the air and on the ground."""
     # interruptions only add time, so the minimum is the best estimate
-    odd, even = (np.array(numbers) @ times[begin::2].min(axis=0) / STEPS * 1e9 for begin in (1, 2))
+    odd, even = (np.array(numbers) @ times[begin::2].min(axis=0) / STEPS * 1e9 for begin in (0, 1))
     return Cost(*np.minimum(odd, even), *np.abs(odd - even))
 
 

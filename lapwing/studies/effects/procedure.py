@@ -112,7 +112,7 @@ def study(
     Args:
         scene: scene of multirotors.
         within: [m] largest distance of a flight with the smallest set from that of the scene, for all vehicles.
-        report: called with a description of the work, the number of finished flights, and their total.
+        report: called with a description of the work, and the numbers of finished and of all parts.
         only: names of the effects to remove or add; None for all.
 
     Raises:
@@ -141,20 +141,27 @@ def study(
     with variant_pool(scene) as pool:
         flights = pool.fly([tables, *valid_variants.values()])
         count = len(valid_variants) + 1
-        report("flying the scene", 0, count)
+        total = 2 * count + 2  # flights; kernels of the plant's step with each of them and the smallest set; their cost
+        report("flying the scene; each set of effects compiles once", 0, total)
         reference = next(flights)
         if failure := reference[0].failure:
             raise ValueError(f"{scene.path}: {failure}")
         for done, change in enumerate(valid_variants, 1):
-            report(f"{'without' if change.removed else 'with'} {change.name}", done, count)
+            report(_text_of(change), done, total)
             result[change] = influence(reference, next(flights))
         distances = {name: i.trajectory for (name, removed), i in result.items() if removed and name in present}
         removable = sorted((name for name, d in distances.items() if d <= within), key=distances.__getitem__)
         smallest, distance = _smallest(
-            pool, tables, reference, removable, within, lambda text: report(text, count, count + 1)
+            pool, tables, reference, removable, within, lambda text: report(text, count, total)
         )
-    report("measuring the plant's steps", count, count + 1)
-    full_cost, smallest_cost, *others = all_costs = costs(scene, [tables, smallest, *valid_variants.values()])
+    names = ["of the scene", "of the smallest set", *map(_text_of, valid_variants)]
+
+    def loading(loaded: int) -> None:
+        compiling = [f"compiling (once) or loading the plant's step {name}" for name in names]
+        report([*compiling, "measuring the plant's steps"][loaded], count + loaded, total)
+
+    all_costs = costs(scene, [tables, smallest, *valid_variants.values()], loading)
+    full_cost, smallest_cost, *others = all_costs
     variant_costs = dict(zip(valid_variants, others, strict=True))
     rows = []
     for change in sorted(variants, key=lambda change: (not change.removed, change.name)):
@@ -176,6 +183,10 @@ def study(
         (max(cost.airborne_noise for cost in all_costs), max(cost.standing_noise for cost in all_costs)),
         tuple(vehicle[Vehicle].name for vehicle in vehicles),
     )
+
+
+def _text_of(change: Change) -> str:
+    return f"{'without' if change.removed else 'with'} {change.name}"
 
 
 def _smallest(

@@ -18,10 +18,7 @@ def cover(flights: Sequence[FlightData]) -> Cover:
     columns = ["RMSE", *(names if many else ["this flight"])]
     if published.get("rmse"):
         columns.append(published.get("source", "published"))
-    rows = [
-        (f"{row.axis} [{row.unit}]", *("" if value is None else f"{value:.4f}" for value in row.values))
-        for row in accuracy(flights, published.get("rmse", {}))
-    ]
+    rows = [(f"{row.axis} [{row.unit}]", *row.values) for row in accuracy(flights, published.get("rmse", {}))]
     tables = [facts(flight) for flight in flights]
     keys = dict.fromkeys(key for one in tables for key in one)
     values = {key: list(dict.fromkeys(one.get(key, "") for one in tables)) for key in keys}

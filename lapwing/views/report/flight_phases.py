@@ -6,6 +6,7 @@ import numpy as np
 
 from lapwing.flights.flight_data import FlightData
 from lapwing.flights.flight_topics import AXES
+from lapwing.flights.tracking import digits
 from lapwing.views.report.plot import Level, Line, NotRecordedError, Panel, Plot, reference
 
 DEGREES = 180.0 / np.pi  # [deg] in 1 rad
@@ -73,7 +74,7 @@ def three_axes(flight: FlightData, first: int, actual: np.ndarray, unit: str, sc
             values = scale * flight.errors[name]
             errors = [Line(t[rows], values[part], width=1.0) for rows, part in _stretches(flight.armed)]
             bounds = Level(rmse, "± RMSE"), Level(-rmse, "± RMSE")
-            title = f"RMSE {rmse:.4f} {unit}"
+            title = f"RMSE {digits(rmse)} {unit}"
             panels.append(Panel((*errors, *bounds), f"{name} error [{unit}]", title=title, row=row, column=1))
     if has_errors:
         caption += " On the right: reference minus truth while the motors are armed."

@@ -10,7 +10,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from lapwing.flights.flight_data import FlightData
 from lapwing.flights.flight_topics import AXES
 from lapwing.flights.metrics import own_criteria
-from lapwing.flights.tracking import unit_and_factor
+from lapwing.flights.tracking import digits, unit_and_factor
 from lapwing.views.report.flight_header import differences, facts
 from lapwing.views.report.key_numbers import key_numbers, trouble
 from lapwing.views.report.plotly_script import gzip_base64, remove_unused_traces, script
@@ -27,11 +27,11 @@ _TEMPLATES = Environment(
 
 
 class Accuracy(NamedTuple):
-    """Row of the table of errors: a value for each flight, then the published one; None if missing."""
+    """Row of the table of errors: an error for each flight, then the published one; "" if missing."""
 
     axis: str
     unit: str
-    values: tuple[float | None, ...]
+    values: tuple[str, ...]
 
 
 def flight_page(flights: Sequence[FlightData], view3d: bool = False) -> str:
@@ -111,5 +111,5 @@ def accuracy(flights: Sequence[FlightData], published: dict[str, float]) -> list
     for axis in AXES:
         unit, scale = unit_and_factor(axis)
         values = [flight.rmse.get(axis) for flight in flights] + ([published.get(axis)] if published else [])
-        rows.append(Accuracy(axis, unit, tuple(None if v is None else scale * v for v in values)))
+        rows.append(Accuracy(axis, unit, tuple("" if v is None else digits(scale * v) for v in values)))
     return rows

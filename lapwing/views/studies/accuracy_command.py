@@ -147,14 +147,18 @@ def answer(study: Study) -> str:
     if not finer:
         price = "no method is ten times more accurate"
     elif point.evaluations is None:
-        price = f"ten times more accurate costs {cheapest(finer, study.goal).time / point.time:.2g} times"
+        price = _price(cheapest(finer, study.goal).time / point.time)
     else:
-        ratio = cheapest(finer, study.goal).work[0] / point.evaluations
-        price = f"ten times more accurate costs {ratio:.2g} times"
+        price = _price(cheapest(finer, study.goal).work[0] / point.evaluations)
         cost += f", {point.evaluations} evaluations"
     return (
         f"{study.goal:g}: {point.method} at {setting(point, problem.unit)} (error {point.error:.1e}), {cost}; {price}"
     )
+
+
+def _price(ratio: float) -> str:
+    text = f"{ratio:.2g}"
+    return f"ten times more accurate costs {'no more' if float(text) <= 1.0 else f'{text} times as much'}"
 
 
 def show_points(console: Console, problem: Problem, points: list[Point], rounding: RoundOff | None = None) -> None:

@@ -45,7 +45,8 @@ def criteria_plot(results: Results) -> Plot:
         label = "\n".join(textwrap.wrap(f"{row.text}: {row.failures}", LANE))
         bars.append(Stretch(label, 0.0, share, "", BOUND))
     largest = 100.0 * results.failure.value
-    bars.append(Stretch(f"any: {percent(results.failure)}", 0.0, largest, "", BOUND))
+    any_text = "\n".join(textwrap.wrap(f"any: {percent(results.failure)}", LANE))
+    bars.append(Stretch(any_text, 0.0, largest, "", BOUND))
     shares = Panel(tuple(bars), "", "runs that fail [%]", timed=False, x_range=(0.0, min(100.0, 1.2 * largest + 1.0)))
     metric = subject(results)
     caption = f"Runs that miss each criterion, of {len(results)}."
@@ -119,7 +120,7 @@ def touchdown(results: Results) -> Plot:
     marks = [_points(points[is_success], "success", FLOWN), _points(points[~is_success], "failure", BOUND)]
     for share, dash in ((0.5, "dash"), (0.95, "solid")):
         x, y = ellipse(points, share).T
-        marks.append(Line(x, y, f"{share:.0%} of a normal distribution", REFERENCE, 1.1, dash))
+        marks.append(Line(x, y, f"{100.0 * share:.0f} % of a normal distribution", REFERENCE, 1.1, dash))
     half_radius = np.median(np.linalg.norm(points - points.mean(axis=0), axis=1))
     (x, y), (dx, dy) = points.mean(axis=0), points.std(axis=0, ddof=1)
     caption = (

@@ -8,7 +8,7 @@ from textwrap import wrap
 import numpy as np
 
 from lapwing.flights.consistency import JOINT, SOURCES, bounds
-from lapwing.flights.tracking import AXES, unit_and_factor
+from lapwing.flights.tracking import AXES, digits, unit_and_factor
 from lapwing.studies.campaign.comparison import Comparison
 from lapwing.studies.campaign.explanation import Explanation
 from lapwing.studies.campaign.fleet_columns import NEAREST
@@ -39,14 +39,14 @@ PLOTS = {
 def result(results: Results, digest: str = "") -> StudyResult:
     """Return the result of a campaign whose table has this digest."""
     rejected = results.rejected
-    title = f"{results.scene}: {len(results) + len(rejected['run'])} runs"
+    runs_in_all = len(results) + len(rejected["run"])
     runs = zip(rejected["run"], rejected["outcome_text"], strict=True)
     notes = [f"rejected: run {run}: {text}" for run, text in list(runs)[:LISTED]]
     if len(rejected["run"]):
         text = "; they count neither as success nor as failure"
         notes.insert(0, f"The scene rejected the parameters of {len(rejected['run'])} runs{text}")
     if not len(results):
-        return StudyResult(title, "the scene rejected every run", "bad", notes=tuple(notes))
+        return StudyResult(results.scene, f"the scene rejected all {runs_in_all} runs", "bad", notes=tuple(notes))
     if len(results) > 1 and not results.figures:
         notes.append("All runs are equal: the scene has no random numbers, and no key varies")
     failed = ~results["success"].astype(bool)
@@ -60,7 +60,7 @@ def result(results: Results, digest: str = "") -> StudyResult:
     spreads = {name: spread for name in results.figures if (spread := results.spread(name))}
     metric = subject(results)
     return StudyResult(
-        title, verdict(results), "bad" if failed.any() else "warn" if results.lost else "good",
+        results.scene, verdict(results), "bad" if failed.any() else "warn" if results.lost else "good",
         (results.outcome_text,),
         tuple(_tables(results)),
         {name: partial(draw, results) for name, draw in PLOTS.items()},
@@ -68,7 +68,7 @@ def result(results: Results, digest: str = "") -> StudyResult:
         _facts(results),
         {
             "scene": results.scene,
-            "runs": len(results) + len(rejected["run"]),
+            "runs": runs_in_all,
             "outcome_text": results.outcome_text,
             "failure": results.failure,
             "criteria": criteria(results),
@@ -89,7 +89,7 @@ def _tables(results: Results) -> list[Rows]:
         rows = Rows("Worst run and success rate of each vehicle", "vehicle", *VEHICLE_COLUMNS.values(), "success")
         for vehicle in results.vehicles:
             worst = [results.spread(f"{vehicle}.{name}") for name in VEHICLE_COLUMNS]
-            share = f"{results[f'{vehicle}.success'].astype(bool).mean():.1%}"
+            share = f"{100.0 * results[f'{vehicle}.success'].astype(bool).mean():.1f} %"
             rows.add(vehicle, *(digits(s.worst) if s else "" for s in worst), share)
         tables.append(rows)
     return [*tables, *_worst(results)]
@@ -111,7 +111,7 @@ def _errors(results: Results, of: str, kind: str) -> Rows:
     published = kind == "rmse" and results.published
     heads = ("\n".join(wrap(results.source, 10)), "worst /\npublished") if published else ()
     title = f"Root-mean-square error between reference and {of}"
-    rows = Rows(title, "axis", "median", "95 %", "worst", "run", *heads)
+    rows = Rows(title, "axis", "median", "95 % of\nruns below", "worst", "run", *heads)
     for axis in AXES:
         s, (unit, scale) = results.spread(f"{kind}.{axis}"), unit_and_factor(axis)
         if s is None:
@@ -149,8 +149,8 @@ def _estimate_lines(results: Results) -> list[str]:
     """Return lines on the estimate: share within 3 sigma, joint NEES and NIS over all runs with their 95 % bounds."""
     lines = []
     least = {axis: results.spread(f"within_3sigma.{axis}") for axis in "xyz"}
-    if text := ", ".join(f"{axis} {s.worst:.1%} (run {s.run})" for axis, s in least.items() if s):
-        shares = ", ".join(f"{axis} {results[f'within_3sigma.{axis}'].mean():.2%}" for axis in "xyz")
+    if text := ", ".join(f"{axis} {100.0 * s.worst:.1f} % (run {s.run})" for axis, s in least.items() if s):
+        shares = ", ".join(f"{axis} {100.0 * results[f'within_3sigma.{axis}'].mean():.2f} %" for axis in "xyz")
         lines.append(f"Ground truth within 3 sigma of the estimate: {shares} of the time; lowest of a flight: {text}")
     finite = results["nees"][np.isfinite(results["nees"])]
     if not len(finite):
@@ -166,15 +166,9 @@ def _estimate_lines(results: Results) -> list[str]:
     return [
         *lines,
         f"Joint NEES of attitude, velocity, position: {finite.mean():.2f}, expected {JOINT}, 95 % bounds {low:.2f} to "
-        f"{high:.2f}; within its 95 % quantile {share:.1%} of the time",
+        f"{high:.2f}; within its 95 % quantile {100.0 * share:.1f} % of the time",
         f"NIS by dimension, expected 1 (95 % bounds): {', '.join(innovations)}",
     ]
-
-
-def digits(value: float) -> str:
-    """Return a number with three significant digits and at least four decimals: 1.2345, 0.000214."""
-    decimals = 4 if value == 0.0 or abs(value) >= 1e-2 else min(2 - math.floor(math.log10(abs(value))), 9)
-    return f"{value:.{decimals}f}"
 
 
 def _facts(results: Results) -> dict[str, str]:
@@ -196,7 +190,7 @@ def _change(ratio: Interval) -> str:
     if ratio.value < 9.0:
         return percent(ratio, signed=True)
     times, low, high = (f"{1.0 + number:.4g}" for number in ratio)
-    return f"{times} times as large (95 %: {low} to {high})"
+    return f"{times} times as large (95 % confidence interval {low} to {high})"
 
 
 def comparison_result(comparison: Comparison) -> StudyResult:

@@ -11,14 +11,15 @@ from lapwing.views.report.style import BOUND, FLOWN, QUIET
 from lapwing.views.studies.study_result import Rows, StudyResult
 
 OMITTED = "#9CC3DD"  # colour of effects that can be omitted
-MIN_BAR = 1e-6  # [m] length of the shortest bars
+SHORTEST = 1e-6  # [m] least change with a bar
 
 
 def result(study: Study) -> StudyResult:
     """Return the result of a study of effects."""
     fleet = len(study.vehicles) > 1
     absent = "not in all vehicles" if fleet else "not in the scene"
-    saved = 1.0 - study.smallest_airborne / study.airborne, 1.0 - study.smallest_standing / study.standing
+    hovering = _share(study.airborne - study.smallest_airborne, study.airborne, study.noise[0]) or "nothing"
+    standing = _share(study.standing - study.smallest_standing, study.standing, study.noise[1]) or "nothing"
     steps = f"plant step of all {len(study.vehicles)} vehicles" if fleet else "plant step"
     rows = [(active, row) for active in (True, False) for row in _sorted_rows(study, active)]
     notes = ['Costs after "<" are below the resolution of the measurement.']
@@ -34,7 +35,7 @@ def result(study: Study) -> StudyResult:
         f"smallest set of effects within {study.within:g} m: {', '.join(study.smallest) or 'none'}",
         "",
         (
-            f"distance {study.distance:.2g} m; saves {saved[0]:.0%} of a step hovering, {saved[1]:.0%} on the ground",
+            f"distance {study.distance:.2g} m; saves {hovering} of a step hovering, {standing} on the ground",
             f"{absent.capitalize()}, influence above {study.within:g} m: {missing}",
             f"{steps}: {study.airborne:.0f} ns hovering, {study.standing:.0f} ns on the ground",
         ),
@@ -53,10 +54,15 @@ def _table(title: str, study: Study, active: bool) -> Rows:
     for row in _sorted_rows(study, active):
         if row.influence is None:
             continue
-        ratio = f"{row.airborne / study.airborne:.0%}" if row.airborne > study.noise[0] else ""
+        ratio = _share(row.airborne, study.airborne, study.noise[0])
         airborne, standing = _cost(row.airborne, study.noise[0]), _cost(row.standing, study.noise[1])
         rows.add(row.name.replace(".", "\n  ."), airborne, ratio, standing, *_changes(row.influence))
     return rows
+
+
+def _share(difference: float, whole: float, noise: float) -> str:
+    """Return the share of a cost; "" below the resolution of the measurement."""
+    return f"{100.0 * difference / whole:.0f} %" if difference > noise else ""
 
 
 def _cost(difference: float, noise: float) -> str:
@@ -89,20 +95,26 @@ def _plot(study: Study) -> Plot:
     rows = sorted((r for r in study.rows if r.influence), key=lambda r: -r.influence.trajectory if r.influence else 0.0)
     distances = [row.influence.trajectory for row in rows if row.influence]
     longest = 3.0 * max([e for e in distances if math.isfinite(e)] + [10.0 * study.within])
+    start = 0.5 * SHORTEST
     marks: list[Stretch | Line] = []
     for row, distance in zip(rows, distances, strict=True):
         name = f"{row.name if row.active else f'({row.name})'}, {_cost(row.airborne, study.noise[0])} ns"
+        if row.influence and row.influence.failure:
+            name += ", ends early"
+        elif distance < SHORTEST:
+            name += f", < {SHORTEST:.0e} m" if distance else ", 0 m"
         if row.active:
             colour = FLOWN if row.name.split(".")[0] in study.smallest else OMITTED
         else:
             colour = BOUND if row in study.missing else QUIET
-        marks.append(Stretch(name, MIN_BAR / 2.0, min(max(distance, MIN_BAR), longest), "", colour))
-    corner = np.full(2, MIN_BAR / 2.0), np.full(2, -0.5)  # place of lines without length, for the legend
+        end = min(distance, longest) if distance >= SHORTEST else start
+        marks.append(Stretch(name, start, end, "", colour))
+    corner = np.full(2, start), np.full(2, -0.5)  # place of lines without length, for the legend
     legend = {"needed": FLOWN, "can be omitted": OMITTED, "(missing)": BOUND, "(not needed)": QUIET}
     drawn = {mark.colour for mark in marks}
     marks += [Line(*corner, name, colour) for name, colour in legend.items() if colour in drawn]
     tolerance = np.full(2, study.within)
     marks.append(Line(tolerance, np.array([-0.5, len(rows) - 0.5]), f"tolerance {study.within:g} m", BOUND))
     label = "largest change of the trajectory [m]; beside the names: cost of a plant step, hovering"
-    panel = Panel(tuple(marks), "", label, timed=False, log_x=True, x_range=(MIN_BAR / 2.0, longest))
+    panel = Panel(tuple(marks), "", label, timed=False, log_x=True, x_range=(start, longest))
     return Plot((panel,), "", 1.4 + 0.27 * len(rows))

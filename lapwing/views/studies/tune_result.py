@@ -7,7 +7,7 @@ from typing import Any
 import control
 import numpy as np
 
-from lapwing.flights.tracking import AXES, unit_and_factor
+from lapwing.flights.tracking import AXES, digits, unit_and_factor
 from lapwing.services.autopilot.margins import LOOP_WORDS, Margins
 from lapwing.studies.tune import systems
 from lapwing.studies.tune.corners import failure
@@ -106,7 +106,7 @@ def _errors(tuning: Tuning) -> Rows:
     rows = Rows(title, "axis", "designed", "refined", caption=_ERRORS)
     for axis in AXES:
         unit, scale = unit_and_factor(axis)
-        rows.add(f"{axis} [{unit}]", f"{scale * rmse(p.before, axis):.4f}", f"{scale * rmse(p.after, axis):.4f}")
+        rows.add(f"{axis} [{unit}]", digits(scale * rmse(p.before, axis)), digits(scale * rmse(p.after, axis)))
     return rows
 
 

@@ -131,7 +131,7 @@ def error_table(validation: Validation) -> Rows:
     shown = [k for k, _ in enumerate(FIELDS) if math.isfinite(validation.plant[0][k].mean)]
     interval = any(math.isfinite(metric.low) for metrics in validation.plant for metric in metrics)
     names = [name.replace("_", " ") for name in validation.baselines]
-    heads = ["after [s]", "error", "plant", *(["95% from", "95% to"] if interval else []), *names]
+    heads = ["after [s]", "error", "plant", *(["95 % from", "95 % to"] if interval else []), *names]
     rows = Rows("Mean absolute prediction error", *_heads(heads), texts=("error",))
     for k, steps in enumerate(validation.horizons):
         for f in shown:

@@ -114,7 +114,7 @@ def test_invalid_error_goal_is_rejected(goal):
 
 def test_misspelt_target_lists_choices():
     with pytest.raises(
-        ValueError, match=r"unknown problem 'gyrostat_bloked'; did you mean gyrostat_blocked\? \(problems: .*free"
+        ValueError, match=r"problem 'gyrostat_bloked'; did you mean gyrostat_blocked\? expected .* problems .*free"
     ):
         find("gyrostat_bloked")
 
@@ -136,8 +136,10 @@ def test_json_and_picture(tmp_path):
     }  # fmt: skip
     assert accuracy_command.answer(study) == (
         "0.0001: one at 50 ms (error 6.0e-05), 0.02 ms of CPU time for 1 s, 80 evaluations; "
-        "ten times more accurate costs 1.1 times"
+        "ten times more accurate costs 1.1 times as much"
     )
+    same = study._replace(points=[*points()[:2], points()[1]._replace(error=6e-6)])
+    assert accuracy_command.answer(same).endswith("; ten times more accurate costs no more")
     draw(tmp_path / "a.png", "decay", points(), goal=1e-4, selected=points()[1])
     assert (tmp_path / "a.png").read_bytes()[:4] == b"\x89PNG"
 

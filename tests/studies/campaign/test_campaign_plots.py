@@ -103,7 +103,8 @@ def failing_table(runs=200):
 def test_verdict_names_failures_criteria_and_driver():
     result, failures = failing_table()
     text = verdict(result)
-    assert text.startswith(f"{failures} of 200 runs fail, {round(failures / 2)} % (95 %: ")  # digits that n allows
+    share = f"{round(failures / 2)} % (95 % confidence interval "  # digits that n allows
+    assert text.startswith(f"{failures} of 200 runs fail, {share}")
     assert f": {failures} by touchdown.speed < 0.25, 0 by rmse.z < 0.1; " in text
     assert text.endswith("; touchdown.speed is driven by a (1.0 of the variance)")
     first, *_ = campaign_result(result).plots
@@ -115,7 +116,7 @@ def test_first_figure_has_failing_metric_with_limit():
     bars, distribution = criteria_plot(result).panels
     lanes, ends = zip(*((bar.lane, bar.end) for bar in bars.marks), strict=True)
     assert lanes[:2] == (f"touchdown.speed < 0.25: {failures}", "rmse.z < 0.1: 0")
-    assert lanes[2].startswith(f"any: {round(failures / 2)} % (95 %: ")
+    assert lanes[2].startswith(f"any: {round(failures / 2)} % (95 % confidence\n")
     assert ends == pytest.approx((failures / 2, 0.0, failures / 2))
     assert sensitivity(result).panels[0].title == "touchdown.speed"
     assert distribution.x_label == "touchdown.speed [m/s]"
@@ -128,7 +129,7 @@ def test_console_begins_with_verdict_and_fits_80_columns():
     with screen.capture() as capture:
         show(screen, campaign_result(result))
     lines = capture.get().splitlines()
-    assert lines[0].startswith(f"hover: 200 runs: {failures} of 200 runs fail")
+    assert lines[0].startswith(f"hover: {failures} of 200 runs fail")
     assert any(line.strip().startswith("touchdown.speed < 0.25") and "█" in line for line in lines)
     tables = [line for line in lines[1:] if not line.startswith("  ")]
     assert max(map(len, tables)) <= 80

@@ -73,9 +73,9 @@ def test_ratio_change_is_relative_and_paired():
     result = ratio_change(a, a * np.tile([1.03, 1.05], 200))
     assert result.value == pytest.approx(0.04, abs=1e-4)
     assert 0.038 < result.low < result.high < 0.042
-    assert percent(result, signed=True) == "+4.00 % (95 %: +3.90 to +4.09)"
-    assert percent(interval(0, 100)) == "0 % (95 %: 0 to 4)"
-    assert percent(interval(0, 100_000)) == "0.000 % (95 %: 0.000 to 0.004)"
+    assert percent(result, signed=True) == "+4.00 % (95 % confidence interval +3.90 to +4.09)"
+    assert percent(interval(0, 100)) == "0 % (95 % confidence interval 0 to 4)"
+    assert percent(interval(0, 100_000)) == "0.000 % (95 % confidence interval 0.000 to 0.004)"
 
 
 def test_least_failing_value_is_bracketed():

@@ -19,7 +19,7 @@ from lapwing.studies.effects.cost import Cost
 from lapwing.studies.effects.procedure import Influence, Row, Study, _smallest, influence
 from lapwing.studies.effects.procedure import study as run_study
 from lapwing.studies.effects.variants import Change, changes, check_effects, fly_for_truth, tables_of, variant
-from lapwing.views.report.plot import Line
+from lapwing.views.report.plot import Line, Stretch
 from lapwing.views.studies import effects_result
 from lapwing.views.studies.study_result import show, write_json, write_plot
 from lapwing.views.terminal import console
@@ -125,7 +125,7 @@ def synthetic_flights(monkeypatch):
             return ([moved([0.0, 1.0]) for _ in tables] for tables in variants)
 
     monkeypatch.setattr(procedure, "variant_pool", lambda scene: contextlib.nullcontext(Same()))
-    monkeypatch.setattr(procedure, "costs", lambda scene, variants: [Cost(1.0, 1.0, 0.1, 0.1)] * len(variants))
+    monkeypatch.setattr(procedure, "costs", lambda scene, variants, report: [Cost(1.0, 1.0, 0.1, 0.1)] * len(variants))
 
 
 @pytest.mark.usefixtures("synthetic_flights")
@@ -235,6 +235,8 @@ def test_table_json_and_plot(tmp_path, capsys):
     assert "…" not in text  # no number is cut
     assert ["effect", "[ns]", "share", "[ns]", "[m]", "[m]", "energy"] in [line.split() for line in text.splitlines()]
     assert "ends early" in text
+    assert "  distance 0 m; saves nothing of a step hovering, nothing on the ground" in text.splitlines()
+    assert "25 %" in text  # 20 of 80 ns
     assert "< 1.5" in text  # cost of gravity, below the resolution of the measurement
     assert "not flown: gust.peak: field required" in text
     assert "Not in the scene, influence above 0.01 m: wind" in text
@@ -246,9 +248,14 @@ def test_table_json_and_plot(tmp_path, capsys):
     assert (tmp_path / "study.png").read_bytes().startswith(b"\x89PNG")
 
 
-def test_legend_names_only_kinds_that_are_drawn():
-    plot = effects_result.result(study()).plots["Influence of effects"]()
+def test_plot_has_no_bar_without_change_and_legend_of_drawn_kinds():
+    small = [Row(name, False, Influence(e, e, e), 5.6, 1.0) for name, e in (("collision", 0.0), ("rotor_damage", 9e-7))]
+    changed = study()
+    plot = effects_result.result(changed._replace(rows=(*changed.rows, *small))).plots["Influence of effects"]()
     (panel,) = plot.panels
+    lanes = {mark.lane: mark.end - mark.start for mark in panel.marks if isinstance(mark, Stretch)}
+    assert lanes["(collision), 5.6 ns, 0 m"] == lanes["(rotor_damage), 5.6 ns, < 1e-06 m"] == 0.0
+    assert lanes["gravity, < 1.5 ns, ends early"] > lanes["(wind), 20 ns"] > 0.49
     legend = [mark.name for mark in panel.marks if isinstance(mark, Line)]
     assert legend == ["needed", "(missing)", "(not needed)", "tolerance 0.01 m"]
 

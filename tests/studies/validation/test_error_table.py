@@ -31,7 +31,7 @@ def test_every_cell_has_one_complete_number(interval):
     table = error_table(validation(interval))
     heads, rows = [head.replace("\n", " ") for head in table.heads], table.rows
     assert len(rows) == 2 * (len(FIELDS) - 1)
-    assert [heads[2:5] == ["plant", "95% from", "95% to"], len(heads)] == [interval, 7 if interval else 5]
+    assert [heads[2:5] == ["plant", "95 % from", "95 % to"], len(heads)] == [interval, 7 if interval else 5]
     assert {len(row) for row in rows} == {len(heads)}
     assert all(math.isfinite(float(cell)) for row in rows for cell in row[2:])
     console = Console(record=True, width=80)
