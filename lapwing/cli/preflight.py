@@ -91,7 +91,7 @@ def warn_of_fence(scene: "Scene", config: "RunConfig") -> None:
         if not vehicle.has(FenceTable) or service is None or not isinstance(service.parameters, TrajectoryConfig):
             continue
         fence = Fence(vehicle[FenceTable].items())
-        for time, phase, x, y in service.parameters.track(member.duration):
+        for time, phase, x, y, _ in service.parameters.track(member.duration):
             if breach := fence.breach(x, y):
                 prefix = f"{member.vehicle}: " if scene.vehicles else ""
                 message = f"x = {x:z.1f} m, y = {y:z.1f} m at t = {time:.1f} s in phase {phase!r} is {breach}"

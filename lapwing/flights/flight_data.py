@@ -14,7 +14,16 @@ from lapwing.cosim.log import LogReader
 from lapwing.flights import tracking
 from lapwing.flights.accident import with_causes
 from lapwing.flights.contacts import Neighbours, Touch, contacts
-from lapwing.flights.flight_events import IMU_SELECTION, Event, events, imu_failures, in_order, slack, with_crash
+from lapwing.flights.flight_events import (
+    IMU_SELECTION,
+    Event,
+    events,
+    imu_failures,
+    in_order,
+    refusals,
+    slack,
+    with_crash,
+)
 from lapwing.flights.flight_provenance import Origin
 from lapwing.flights.flight_topics import FlightTracking
 from lapwing.flights.mission import Mission, mission_of
@@ -26,6 +35,7 @@ from lapwing.messages.topics import (
     ACTUATORS,
     BATTERY,
     BODIES,
+    COMMAND_ACKS,
     CONTACT,
     ESTIMATE,
     ESTIMATE_COVARIANCE,
@@ -46,7 +56,17 @@ IN_SPACE = (TRUTH, BODIES, CONTACT, SETPOINT, ACTUATORS, SONAR, RANGEFINDER)  # 
 FLEET_TOPICS = (*IN_SPACE, STATUS)  # topics of the other vehicles of a fleet: for drawing, and for their outcomes
 
 # Topics for outcome, events, metrics and report.
-SHOWN = (*IN_SPACE, STATUS, ESTIMATE, ESTIMATE_COVARIANCE, LIFT, BATTERY, EVENTS, custom_sensor(ports.IMU_SELECTION))
+SHOWN = (
+    *IN_SPACE,
+    STATUS,
+    COMMAND_ACKS,
+    ESTIMATE,
+    ESTIMATE_COVARIANCE,
+    LIFT,
+    BATTERY,
+    EVENTS,
+    custom_sensor(ports.IMU_SELECTION),
+)
 
 
 class FlightData(FlightTracking):
@@ -231,6 +251,8 @@ class FlightData(FlightTracking):
         result = events(self.truth, status, setpoint, self.armed, self.origin.scene, self.contacts)
         if self.has(IMU_SELECTION):
             result = in_order([*result, *imu_failures(self.topic(IMU_SELECTION))])
+        if self.has("vehicle_command_ack"):
+            result = in_order([*result, *refusals(self.topic("vehicle_command_ack"))])
         load = self.origin.scene.get("cooperative_load")
         if load and self.has("body_states") and self.has("rotor_wrench"):  # no autopilot, so no other kinds of events
             result += slack(self.topic("body_states"), self.topic("rotor_wrench"), load)

@@ -1,4 +1,4 @@
-"""Events of a flight: arming, modes, phases, failsafes, faults, slack links, saturation, contact."""
+"""Events of a flight: arming, refused commands, modes, phases, failsafes, faults, slack links, saturation, contact."""
 
 import math
 from collections.abc import Iterable, Iterator, Mapping
@@ -12,6 +12,7 @@ from lapwing.flights.outcome import FlightOutcome
 from lapwing.flights.saturation import description, highest_voltage, intervals, saturation
 from lapwing.flights.tension import link_tension, pushes
 from lapwing.flights.topic_view import TopicView
+from lapwing.messages import CommandAck, CommandAcks, header
 from lapwing.services.common import ports, status_texts
 from lapwing.services.common.event_kinds import KINDS
 
@@ -39,6 +40,7 @@ UNITS = {
     "airspeed": " Pa",
 }  # by channel, or by a sensor with one channel; fmt: skip
 ORDER = tuple(KINDS)  # order of simultaneous events
+REFUSALS = (CommandAck.TEMPORARILY_REJECTED, CommandAck.DENIED, CommandAck.UNSUPPORTED, CommandAck.FAILED)
 OVER = ": over"  # end of the text of an event that ends a failsafe
 
 
@@ -201,6 +203,16 @@ def imu_failures(selection: TopicView) -> list[Event]:
                 text = status_texts.IMU_FAILED.format(unit, unit_at[time])
                 result.append(Event(round(time, 9), "fault", text))
         before = bits
+    return result
+
+
+def refusals(answers: TopicView) -> list[Event]:
+    """Return the commands that the autopilot has refused, with its reasons, from its acknowledgements."""
+    result, nothing = [], len(CommandAcks(header(0, "world")).encode())
+    for time_ns, payload in answers.payloads():
+        for answer in CommandAcks.decode(payload).acks if len(payload) > nothing else ():
+            if answer.result in REFUSALS and answer.text:
+                result.append(Event(round(time_ns * 1e-9, 9), "refused", answer.text))
     return result
 
 

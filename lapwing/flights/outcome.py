@@ -149,10 +149,11 @@ def classify(
     if math.isfinite(accident := first_accident(truth, contacts)):
         return outcome("crashed", accident, "", failsafe)
     over = mission_finished(status) or (failsafe and status.landed[-1] and not status.armed[-1])
-    if failure and not (failure == ENDED and over and not _not_resting(truth, status, cosine)):
+    at_rest = over and not _not_resting(truth, status, cosine)
+    if failure and not (failure == ENDED and at_rest):
         return outcome("aborted", end, failure, failsafe)
     grounded = touches and touches[0].start == 0 and end - truth.times[min(touches[0].stop, len(truth) - 1)] < BOUNCE
-    if grounded and (mission is not None or not over):
+    if grounded and (mission is not None or not over or (at_rest and not failsafe)):
         unarmed = _unarmed(status)
         tried = float(status.armed.mean()) * end > TRYING if "armed" in status.fields else True
         if mission is not None and (tried or failsafe or not mission.is_longer):
@@ -168,8 +169,9 @@ def classify(
     if fault := _not_resting(truth, status, cosine):
         return outcome("crashed", end, fault, failsafe)
     # the last touch before the motors stopped; without contact information, the end
-    time = float(truth.times[touches[-1].start]) if touches else end
-    how = [f"upright on its feet, {_touchdown_text(hardest, commanded)}"] if hardest else []
+    time = float(truth.times[touches[-1].start]) if touches and not grounded else end
+    landing = f"upright on its feet, {_touchdown_text(hardest, commanded)}" if hardest else ""
+    how = list(filter(None, [NEVER_LEFT if grounded else landing]))
     if failsafe:
         how.insert(0, f"{failsafe[1]} at {failsafe[0]:.2f} s")
     is_far = distance is not None and distance > LANDING_RADIUS
@@ -220,7 +222,7 @@ def _harder(commanded: float | None) -> float:
 def _touchdown_text(touch: Touch, commanded: float | None) -> str:
     """Return the speed of a touch, that commanded, and whether it was harder; on a roof also its name."""
     place = f" on {touch.body}" if touch.face else ""
-    text = f"touched down{place} at {touch.speed:.2f} m/s"
+    text = f"touched down{place} at {round(touch.speed, 2) + 0.0:.2f} m/s"
     if commanded is None:
         return text
     harder = ", harder than commanded" if touch.speed > _harder(commanded) else ""

@@ -17,11 +17,12 @@ KINDS = {
     "mode": Kind(),
     "phase": Kind(),
     "arming": Kind(),
+    "refused": Kind(),
     "contact": Kind(),
     "crash": Kind(serious=True, afterwards=True),
     "slack": Kind(serious=True),
     "motors": Kind(afterwards=True),
     "battery": Kind(),
 }
-"""Event kinds by name: faults, validity warnings, failsafes, modes and phases, arming, contact,
-the crash, slack links, motors at a limit, charge."""
+"""Event kinds by name: faults, validity warnings, failsafes, modes and phases, arming, refused commands,
+contact, the crash, slack links, motors at a limit, charge."""

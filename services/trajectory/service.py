@@ -28,25 +28,25 @@ class TrajectoryConfig(NamedTuple):
     core: TrajectoryPath | FollowedPath
     phases: tuple[str, ...]  # names by index
 
-    def track(self, duration: float) -> Iterator[tuple[float, str, float, float]]:
-        """Yield time [s], phase and world x, y [m], until the vehicle holds or `duration` [s] is over."""
+    def track(self, duration: float) -> Iterator[tuple[float, str, float, float, float]]:
+        """Yield time [s], phase and world x, y, z [m], until the vehicle holds or `duration` [s] is over."""
         core = self.core
         paths = [core.relative.path, core.leader.path] if isinstance(core, FollowedPath) else [core.path]
         own = paths[0]
         duration = min(duration, max(float(c.start[-1]) for path in paths for c in (path.x, path.y, path.yaw)))
         for sample in range(int(duration / TRACK_INTERVAL) + 2):
             time = min(sample * TRACK_INTERVAL, duration)
-            x, y = _place(own, time)
+            x, y, z = _place(own, time)
             if isinstance(core, FollowedPath):
                 s, c = math.sincos(_channel_at(core.leader.path.yaw, time)[0]) if core.heading else (0.0, 1.0)
-                x0, y0 = _place(core.leader.path, time)
-                x, y = x0 + c * x - s * y, y0 + s * x + c * y
-            yield time, self.phases[_last_not_after(own.phase_start, time)], x, y
+                x0, y0, z0 = _place(core.leader.path, time)
+                x, y, z = x0 + c * x - s * y, y0 + s * x + c * y, z0 + z
+            yield time, self.phases[_last_not_after(own.phase_start, time)], x, y, z
 
 
-def _place(path: Parameters, time: float) -> tuple[float, float]:
-    x, y, _ = path.origin_world
-    return x + _channel_at(path.x, time)[0], y + _channel_at(path.y, time)[0]
+def _place(path: Parameters, time: float) -> tuple[float, float, float]:
+    x, y, z = path.origin_world
+    return x + _channel_at(path.x, time)[0], y + _channel_at(path.y, time)[0], z + _channel_at(path.z, time)[0]
 
 
 def create(config: RunConfig) -> Service:

@@ -3,6 +3,10 @@
 import numpy as np
 import synthetic_flights
 
+from lapwing.flights.flight_events import refusals
+from lapwing.flights.topic_view import TopicView
+from lapwing.messages import CommandAck, CommandAcks, header
+from lapwing.messages.topic_columns import history
 from lapwing.views.report.plots import timeline
 
 TICKS, RATE = 500, 100
@@ -45,6 +49,20 @@ def example_flight(voltage=None):
     return synthetic_flights.flight(
         TICKS, RATE, scene=SCENE, ground_truth=truth, status=status, setpoint=setpoint, actuators=actuators
     )
+
+
+def test_refused_commands_are_events_with_reasons():
+    def answer(result, text=""):
+        return CommandAcks(header(0, "world"), (CommandAck("view", 1, result, 0.0, text, 0.0),), ())
+
+    answers = [
+        CommandAcks(header(0, "world"), (), ("armed",)),
+        answer(CommandAck.ACCEPTED),
+        answer(CommandAck.TEMPORARILY_REJECTED, "return: the vehicle does not fly"),
+    ]
+    times = np.array([0, 100_000_000, 1_100_000_000])
+    columns = history(CommandAcks, [each.encode() for each in answers])
+    assert refusals(TopicView(times, columns)) == [(1.1, "refused", "return: the vehicle does not fly")]
 
 
 def test_events_are_listed_in_order():

@@ -108,7 +108,7 @@ def steps():
     while not diagram.ended:
         before = diagram.tick
         diagram.advance(min(diagram.tick + 30, config.last_tick + 1))
-        pages = list(diagram.record_batches(before, diagram.tick))
+        pages = list(diagram.record_batches(before, diagram.tick))[::-1]  # a batch for each length of a message
         live.add(delayed + [page for page in pages if page.topic.name.endswith("ground_truth")])
         delayed = [page for page in pages if not page.topic.name.endswith("ground_truth")]  # delivered later
         if (step := live.step((before - 1) * config.interval_ns)) is not None:
@@ -137,5 +137,6 @@ def test_events_are_reported_once(steps, whole):
     for step in steps:
         reported += new_events(step, after)
         after = float(step.truth.times[-1])
+        assert not new_events(step, after)
     assert reported == [event for event in whole.events if not KINDS[event.kind].afterwards]
     assert {event.kind for event in reported} >= {"arming", "mode", "phase", "contact"}

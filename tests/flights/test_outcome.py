@@ -74,6 +74,15 @@ def test_vehicle_that_slides_without_takeoff_never_left_the_ground(finished):
     assert (outcome.kind, outcome.how, outcome.mark) == ("timed out", "never left the ground", "warn")
 
 
+def test_vehicle_that_is_only_armed_and_disarmed_never_took_off():
+    status = {"armed": (T > 1.0) & (T < 3.0), "mode": "hold"}
+    outcome = fly(ground_contact=True, velocity=0.0, status=status)
+    assert (outcome.kind, outcome.mark) == ("completed", "warn")
+    assert str(outcome) == "Completed at 4.99 s: never left the ground: no mission"
+    lost = fly(ground_contact=True, velocity=0.0, status=status | failsafe(2.0, "link lost"))
+    assert str(lost).startswith("Ended in failsafe at 4.99 s: link lost at 2.00 s, never left the ground")
+
+
 def test_blockers_of_arming_are_reasons_to_stay_on_the_ground():
     blockers = np.empty(TICKS, object)
     blockers[:] = [("the vehicle is not level", "the battery is low: 3%")] * TICKS

@@ -119,6 +119,29 @@ def test_error_after_a_lost_interrupt_is_the_interrupt(error):
     assert (done.returncode, done.stdout, done.stderr) == (143, "", "lapwing: ended by SIGTERM\n")
 
 
+CAUGHT = """
+import os, signal
+from lapwing.cli import entry_point, main
+from lapwing.cosim.processes.interrupt import Stop
+
+def run(*arguments, **options):
+    try:
+        os.kill(os.getpid(), signal.SIGINT)
+    except BaseException:  # like modules of scipy and requests while they are imported
+        pass
+    with Stop() as stop:
+        stop.check()
+
+main.app = run
+entry_point.main()
+"""
+
+
+def test_interrupt_that_a_library_catches_before_the_run_ends_it():
+    done = subprocess.run([sys.executable, "-c", CAUGHT], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout, done.stderr) == (130, "", "lapwing: ended by SIGINT\n")
+
+
 @pytest.mark.long
 @pytest.mark.parametrize("mode", ["single-process", "multi-process"])
 def test_ctrl_c_in_flight_has_equal_text_in_both_modes(tmp_path, mode):

@@ -1,6 +1,5 @@
 """Live page of a run: access, and drawing in a browser."""
 
-import contextlib
 import os
 import re
 import socket
@@ -197,12 +196,20 @@ def test_sticks_of_the_page_fly_the_vehicle_and_the_flight_is_repeated(tmp_path)
         for query in INVALID:
             assert refused(f"{address}sticks{query}") == 400
         assert refused(f"{address}sticks?vehicle=drone1&kind=arm", Origin="http://example.org") == 403
+        faults = []
         while run.poll() is None:  # forward and up, until the page is gone
             for query in ("kind=arm", "kind=position_control", "kind=manual&values=1,0,0.5,0"):
-                with contextlib.suppress(OSError):
+                try:
                     get(f"{address}sticks?vehicle=drone1&{query}")
+                except urllib.error.HTTPError as error:
+                    faults.append(error.code)
+                except OSError:  # the page is gone
+                    pass
             time.sleep(0.05)
-    position = read_log(log).truth.position
+    assert faults == []
+    flight = read_log(log)
+    assert flight.status.times[flight.status.armed][0] > 0.1  # commands before the first step are ignored
+    position = flight.truth.position
     assert min(position[:, 0].max(), position[:, 2].max()) > 1.0
     command = [sys.executable, "-m", "lapwing", "resimulate", str(log)]
     done = subprocess.run(command, capture_output=True, text=True, check=False, env=environment)

@@ -55,7 +55,8 @@ class Stop:
             running: returns the name of the Python block that runs, "" if none does. A block that still runs after
                 `BLOCK_LIMIT` is interrupted by `Interrupted`, so that the log is completed.
         """
-        self.number: int | None = None
+        # An interrupt that a library has caught while it was imported ends the run.
+        self.number = None if _raised is None else _raised.signal
         self.detail, self._running, self._patience = "", running, Patience(BLOCK_LIMIT)
 
     def __enter__(self) -> "Stop":

@@ -181,8 +181,9 @@ class RunMonitor:
         self._bus.declare_liveliness(f"{self._key_prefix}/{key}/{MONITOR}")
 
     def publish(self, key: str, time_ns: int, payload: bytes) -> None:
-        """Publish a message for viewers, on a key below the prefix of the run."""
-        self._bus.publisher(f"{self._key_prefix}/{key}", drops=True)(payload, time_ns)
+        """Publish a message for viewers, on a key below the prefix of the run; after its end, do nothing."""
+        with self._bus.until_closed():
+            self._bus.publisher(f"{self._key_prefix}/{key}", drops=True)(payload, time_ns)
 
     @property
     def complete(self) -> bool:

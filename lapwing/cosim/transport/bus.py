@@ -7,8 +7,8 @@ import json
 import threading
 import time
 import uuid
-from collections.abc import Callable, Iterable, Mapping
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
 from types import MappingProxyType
 from typing import Any
 
@@ -105,6 +105,15 @@ class ZenohBus:
 
             self._publishers[key] = (zenoh_publisher, put)
         return self._publishers[key][1]
+
+    @contextmanager
+    def until_closed(self) -> Iterator[None]:
+        """Ignore that the bus is closed, as for a thread that does not know of the end of the run."""
+        try:
+            yield
+        except zenoh.ZError:
+            if not self._closed.is_set():
+                raise
 
     def has_subscribers(self, keys: Iterable[str]) -> bool:
         """Return True if one of the keys, for which this bus has publishers, has a subscriber."""

@@ -1,6 +1,7 @@
 """Live feed of a multi-process run: new steps and events for displays."""
 
 from collections.abc import Callable, Iterable, Sequence
+from operator import itemgetter
 
 import numpy as np
 
@@ -15,12 +16,14 @@ from lapwing.flights.log_events import event_messages
 from lapwing.flights.topic_view import TopicView
 from lapwing.messages.topic_columns import history
 from lapwing.messages.topics import (
+    COMMAND_ACKS,
     DEPTH_IMAGE,
     ESTIMATE,
     EVENTS,
     LASER_SCAN,
     POINT_CLOUD,
     STATUS,
+    TRUTH,
     Topic,
     template_topic,
 )
@@ -66,7 +69,7 @@ class LiveFeed:
             flight.add(pages)
 
 
-TOPICS = (*IN_SPACE, STATUS, ESTIMATE, LASER_SCAN, POINT_CLOUD, DEPTH_IMAGE)
+TOPICS = (*IN_SPACE, STATUS, COMMAND_ACKS, ESTIMATE, LASER_SCAN, POINT_CLOUD, DEPTH_IMAGE)
 
 
 class LiveFlight:
@@ -86,12 +89,15 @@ class LiveFlight:
             if topic in self._pending and page.topic.vehicle in ("", self._config.vehicle):
                 rows = zip(page.ticks, page.payloads, strict=True)
                 self._pending[topic] += [(int(k) * interval, row.tobytes()) for k, row in rows]
+                self._pending[topic].sort(key=itemgetter(0))  # messages of different lengths are in different batches
 
     def step(self, until_ns: int) -> FlightData | None:
         """Return the new samples up to `until_ns` [ns], and before them the newest of the previous step.
 
         Return None without new ground truth.
         """
+        if sum(time_ns <= until_ns for time_ns, _ in self._pending[TRUTH]) < 2:
+            return None
         views: dict[str, TopicView] = {}
         for topic, messages in self._pending.items():
             now = [message for message in messages if message[0] <= until_ns]
@@ -100,11 +106,10 @@ class LiveFlight:
                 columns = history(topic.message, payloads)
                 views[topic.name.removeprefix("{vehicle}/")] = TopicView(np.array(times, np.int64), columns)
                 del messages[: len(now) - 1]  # the newest is the first of the next step
-        if "ground_truth" not in views or len(views["ground_truth"]) < 2:
-            return None
         return FlightData(views, Origin.of_config(self._config))
 
 
 def new_events(flight: FlightData, after: float) -> list[Event]:
     """Return the events of a step after the time `after` [s]."""
-    return [event for event in flight.occurrences if event.time > after and not KINDS[event.kind].afterwards]
+    before = round(after, 9)  # like the times of events
+    return [event for event in flight.occurrences if event.time > before and not KINDS[event.kind].afterwards]

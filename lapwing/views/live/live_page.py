@@ -100,8 +100,9 @@ class LivePage:
             self._show_events(steps, events)
 
     def follow(self, watch: RunMonitor) -> None:
-        """Send the commands of the page to this run until its end."""
-        self._operate = None if watch.complete else partial(watch.publish, f"{OPERATOR_KEY}/{MONITOR}")
+        """Send the commands of the page to this run from its first step to its end."""
+        flies = watch.time_ns > 0 and not watch.complete  # before it kernels compile: the commands would wait
+        self._operate = partial(watch.publish, f"{OPERATOR_KEY}/{MONITOR}") if flies else None
 
     def _take_sticks(self, query: str) -> bool:
         """Publish the command of a request of the page; return False if it is invalid."""

@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from lapwing.flights.flight_data import FlightData
-from lapwing.views.report.flight_header import differences, facts
+from lapwing.views.report.flight_header import MANY, cut, differences, facts
 from lapwing.views.report.key_numbers import KeyNumber, key_numbers
 from lapwing.views.report.page import accuracy
 from lapwing.views.report.paper import Cover
@@ -23,6 +23,9 @@ def cover(flights: Sequence[FlightData]) -> Cover:
     keys = dict.fromkeys(key for one in tables for key in one)
     values = {key: list(dict.fromkeys(one.get(key, "") for one in tables)) for key in keys}
     differing = differences(*scenes) if len(scenes) == 2 else {}
+    listed = [f"{key}: {_side_by_side([cut(value) for value in v])}" for key, v in list(differing.items())[:MANY]]
+    if len(differing) > MANY:
+        listed.append(f"{len(differing) - MANY} more, in the report as a page")
     return Cover(
         " and ".join(names) if many else flights[0].metadata.get("scene") or names[0],
         " · ".join(dict.fromkeys(filter(None, (s.get("run", {}).get("title", "") for s in scenes)))),
@@ -34,10 +37,7 @@ def cover(flights: Sequence[FlightData]) -> Cover:
         tuple(rows),
         (
             *((key, _side_by_side(several)) for key, several in values.items()),
-            *(
-                ("" if k else "scenes differ in", f"{key}: {_side_by_side(v)}")
-                for k, (key, v) in enumerate(differing.items())
-            ),
+            *(("" if k else "scenes differ in", text) for k, text in enumerate(listed)),
         ),
         _numbers(flights, names),
     )

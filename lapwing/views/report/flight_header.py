@@ -8,7 +8,8 @@ from lapwing.flights.flight_data import FlightData
 from lapwing.flights.flight_provenance import solver_and_exchange
 
 LONG = 60  # largest number of characters of a value, or of an effect's keys
-MANY = 12  # largest number of listed keys in which two scenes differ
+MANY = 12  # largest number of keys in which two scenes differ that are listed openly
+LONGEST = 500  # largest number of characters of a value in which they differ
 
 
 def facts(flight: FlightData) -> dict[str, str]:
@@ -47,18 +48,17 @@ def facts(flight: FlightData) -> dict[str, str]:
 
 
 def differences(one: dict[str, Any], other: dict[str, Any]) -> dict[str, tuple[str, str]]:
-    """Return both values of the keys in which two scenes differ: the first MANY keys, and the number of the others."""
+    """Return both values of the keys in which two scenes differ; the tables of a list have numbers from 1 as keys."""
     first, second = (_leaves_in_use(scene, uses_gains(one) and uses_gains(other)) for scene in (one, other))
     keys = [key for key in {**first, **second} if first.get(key) != second.get(key)]
-    table = {key: (_cut(first.get(key, "")), _cut(second.get(key, ""))) for key in keys[:MANY]}
-    if len(keys) > MANY:
-        table[f"{len(keys) - MANY} more"] = ("", "")
-    return table
+    return {key: (cut(first.get(key, ""), LONGEST), cut(second.get(key, ""), LONGEST)) for key in keys}
 
 
 def _leaves(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
     """Yield dotted key and value of all leaves; an empty table, such as an effect without keys, is "yes"."""
     for key, value in table.items():
+        if isinstance(value, list | tuple) and value and all(isinstance(item, dict) for item in value):
+            value = {str(k): item for k, item in enumerate(value, 1)}
         if isinstance(value, dict) and value:
             yield from _leaves(value, f"{prefix}{key}.")
         else:
@@ -86,11 +86,16 @@ def _with_keys(name: str, keys: dict[str, Any]) -> str:
     return f"{name} ({text if len(text) <= LONG else f'{len(keys)} keys'})" if text else name
 
 
-def _cut(value: Any) -> str:
-    """Return a value as text, cut to LONG characters: a module's source or a mesh has thousands."""
+def cut(value: Any, longest: int = LONG) -> str:
+    """Return a value as text, cut to `longest` characters: a module's source or a mesh has thousands."""
     text = _short(value)
-    return text if len(text) <= LONG else f"{text[:LONG]}…"
+    return text if len(text) <= longest else f"{text[:longest]}…"
 
 
 def _short(value: Any) -> str:
+    """Return a value as in a scene file; a text without quotes."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, list | tuple):
+        return f"[{', '.join(map(_short, value))}]"
     return f"{value:g}" if isinstance(value, float) else str(value)

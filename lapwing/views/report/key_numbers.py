@@ -71,12 +71,20 @@ def key_numbers(flight: FlightData) -> list[KeyNumber]:
         limit = None if use.low_threshold is None else 100.0 * use.low_threshold
         left = KeyNumber("battery left", 100.0 * use.charge_left, "%", limit, "warning", at_least=True)
         numbers.append(left._replace(label=f"{left.label}, {use.energy_left:.3g} W h"))
-    elif "motor_power" in flight.truth.fields and np.isfinite(flight.truth.motor_power).all():
+    elif _has_power(flight):
         with suppress(ValueError):  # the log has no run configuration
             numbers.append(KeyNumber("energy of the motors", flight.energy / WATT_HOUR, "W h"))
     if outcome.failed:  # nothing of a crash is good
         return [number._replace(limit=None) if number.mark == "good" else number for number in numbers]
     return numbers
+
+
+def _has_power(flight: FlightData) -> bool:
+    """Return True if the log has the power of at least one motor."""
+    if "motor_power" not in flight.truth.fields:
+        return False
+    power = flight.truth.motor_power
+    return power.size > 0 and bool(np.isfinite(power).all())
 
 
 def trouble(flight: FlightData) -> list[Event]:

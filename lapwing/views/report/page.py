@@ -11,7 +11,7 @@ from lapwing.flights.flight_data import FlightData
 from lapwing.flights.flight_topics import AXES
 from lapwing.flights.metrics import own_criteria
 from lapwing.flights.tracking import digits, unit_and_factor
-from lapwing.views.report.flight_header import differences, facts
+from lapwing.views.report.flight_header import MANY, differences, facts
 from lapwing.views.report.key_numbers import key_numbers, trouble
 from lapwing.views.report.plotly_script import gzip_base64, remove_unused_traces, script
 from lapwing.views.report.sections import Section, labels, long, sections
@@ -64,6 +64,7 @@ def flight_page(flights: Sequence[FlightData], view3d: bool = False) -> str:
         trouble=[trouble(flight) for flight in flights],
         facts={key: [one.get(key, "") for one in tables] for key in dict.fromkeys(k for one in tables for k in one)},
         differences=differences(*scenes) if len(scenes) == 2 else {},
+        many=MANY,
         accuracy=accuracy(flights, published.get("rmse", {})),
         columns=columns + ([published.get("source", "published")] if published.get("rmse") else []),
         map=next(section_iterator),
@@ -89,7 +90,7 @@ def _view3d_hint(flights: Sequence[FlightData]) -> str:
     if not all(flight.located for flight in flights):
         return "the position is not measured"
     source = flights[0].origin.source if flights[0].origin.recorded else "LOG"
-    return f"lapwing view {source}" if available() else MISSING
+    return f"lapwing view {source} shows it" if available() else MISSING
 
 
 def render(template: str, sections: Iterable[Section], **values: Any) -> str:

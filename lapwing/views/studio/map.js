@@ -49,6 +49,7 @@
   }
 
   const labels = []; // attributes and texts, drawn above everything else
+  let tracks = []; // places of the paths of a trajectory of phases [m]
   let scale = 1, shift = [0, 0], middle = [0, 0], reach = 5, held = null, tool = null;
   const pixel = (place) => flat(place).map((value, k) => shift[k] + scale * value);
   const make = (kind, attributes, label = "") => {
@@ -102,7 +103,8 @@
   function draw() {
     const { start, points, areas, wind } = shapes(), [x0, y0] = start, home = [x0, y0, 0];
     const route = points?.map(([x, y, z]) => [x0 + x, y0 + y, z]);
-    const all = [home, ...(route ?? []), ...areas.flatMap(({ corners, top }) => corners.flatMap(([x, y]) => [[x, y, 0], [x, y, top]]))];
+    const paths = route ? [] : tracks;
+    const all = [home, ...(route ?? []), ...paths.flat(), ...areas.flatMap(({ corners, top }) => corners.flatMap(([x, y]) => [[x, y, 0], [x, y, top]]))];
     if (!held?.onMove) { // the view stays while something is dragged
       [ca, sa, ce, se] = [view.azimuth, view.elevation].flatMap((angle) => [Math.cos(angle), Math.sin(angle)]);
       const spans = [0, 1].map((k) => [Math.min(...all.map((place) => place[k])), Math.max(...all.map((place) => place[k]))]);
@@ -132,6 +134,7 @@
       route.forEach((place, k) => handle(place, "waypoint", k + 1,
         ([x, y, z]) => replace(WAYPOINTS, k, [...rounded(x - x0, y - y0, z), ...points[k].slice(3)]), points.length > 1 ? () => replace(WAYPOINTS, k) : null));
     }
+    paths.forEach((places) => line(places, "polyline", "path"));
     if (input(START)) handle(home, "start", "start", ([x, y]) => write(START, rounded(x, y)));
     if (wind) {
       const [u, v, w = 0] = wind.value, foot = [cx - 0.8 * reach, cy - 0.8 * reach, 0], tip = [foot[0] + WIND * u, foot[1] + WIND * v, 0];
@@ -222,6 +225,10 @@
     draw();
   };
   form.addEventListener("input", () => held || draw());
+  form.addEventListener("paths", ({ detail }) => {
+    tracks = detail;
+    if (!held) draw();
+  });
   document.querySelector("#map-help").textContent = "Drag what you want to move; with Shift a waypoint or a roof up and down. " +
     "Drag the ground to turn the view; the wheel zooms. Choose what to place, then click the ground (with Shift an area has the other shape, circle or polygon). " +
     `Double-click a dot to remove it${points ? ", the ground to add a waypoint" : ""}.`;

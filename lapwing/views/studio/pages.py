@@ -17,12 +17,14 @@ from starlette.routing import Mount, Route
 from lapwing.cosim.scene import SceneError
 from lapwing.services.common.schemas.run_schema import Run, title
 from lapwing.views import report
-from lapwing.views.report.flight_header import differences
+from lapwing.views.report.flight_header import MANY, differences
 from lapwing.views.studio.form_fields import PLACED, additions, form
 from lapwing.views.studio.recent_flights import RecentFlights
 from lapwing.views.studio.run_processes import StudioRuns
 from lapwing.views.studio.scene_forms import (
+    OFF,
     SPEEDS,
+    SWITCHED,
     command_line,
     form_changes,
     load_named,
@@ -32,6 +34,7 @@ from lapwing.views.studio.scene_forms import (
     schema,
     tables,
     toml_text,
+    tracks,
 )
 from lapwing.views.view3d import MISSING as NO_VIEW
 from lapwing.views.view3d import available
@@ -141,7 +144,9 @@ class Pages:
         fields = {field.key: field for group in form(base, schema()) for field in group.all_fields()}
         for text in sets:
             key, _, value = text.partition("=")
-            if key in fields:
+            if value == OFF and key.count(".") == 1 and key.startswith(SWITCHED):
+                texts[key] = value
+            elif key in fields:
                 texts[key] = value[1:-1] if fields[key].kind in ("text", "choice") and value[:1] == '"' else value
             else:
                 error = error or f"{text}: cannot be changed in this form; use lapwing run {name} --set"
@@ -154,6 +159,7 @@ class Pages:
             additions=additions(base, schema()),
             added=added,
             placed=PLACED,
+            switched=SWITCHED,
             texts=texts,
             faults=dict(faults or {}),
             error=error,
@@ -167,10 +173,11 @@ class Pages:
         """Return the command line, the Python code and the faults of a posted form as JSON."""
         name, posted, added = await posted_form(request)
         changed, faults, error = await run_in_threadpool(form_changes, name, posted, added)
+        paths = [] if faults or error else await run_in_threadpool(lambda: tracks(load_named(name, changed)))
         command = command_line(name, changed, posted.get("speed", ""), posted.get("view") == "yes")
         result = {"command": shlex.join(command), "python": python(name, changed), "toml": toml_text(name, changed)}
         keys = [change.key for change in changed]
-        return JSONResponse({**result, "changed": keys, "faults": faults, "error": error})
+        return JSONResponse({**result, "changed": keys, "faults": faults, "error": error, "paths": paths})
 
     async def start(self, request: Request) -> Response:
         """Start a run of a posted form and show it; show the form again if it has faults."""
@@ -243,6 +250,7 @@ class Pages:
             flights=flights,
             rows=rows,
             differing=differences(flights[0].tree, flights[1].tree) if len(names) == 2 else {},
+            many=MANY,
             pair=urlencode([("flight", name) for name in names[:2]]) if len(names) == 2 else "",
             command=_report_command(*paths) if len(names) == 2 else "",
         )

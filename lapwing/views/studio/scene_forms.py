@@ -11,6 +11,7 @@ from urllib.parse import parse_qsl
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
 
+from lapwing.cosim.diagram.multi_vehicle import members
 from lapwing.cosim.scene import Scene, SceneError
 from lapwing.cosim.scene.overrides import with_values
 from lapwing.cosim.scene.toml_text import dump, toml
@@ -19,8 +20,11 @@ from lapwing.file_schemas.annotations import Schema
 from lapwing.file_schemas.json_schema import scene_schema
 from lapwing.services.common.schemas.run_schema import SHIPPED
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.views.studio.form_fields import Field, form, starting_values
+from lapwing.services.trajectory.service import NAME as TRAJECTORY
+from lapwing.services.trajectory.service import TrajectoryConfig
+from lapwing.views.studio.form_fields import EXTENSIBLE, Field, form, starting_values
 
+OFF, SWITCHED = "false", tuple(f"{name}." for name in EXTENSIBLE)  # value that switches an effect or sensor off
 SPEEDS = ("1", "2", "5", "10", "max")  # selectable values of --speed
 
 
@@ -53,11 +57,12 @@ def changes(
         posted: posted texts by key.
         added: keys of added tables.
     """
-    result = tables(added)
+    off = [key for key, text in posted.items() if text == OFF and key.count(".") == 1 and key.startswith(SWITCHED)]
+    result = [*tables(key for key in added if key not in off), *(Change(key, False) for key in off)]
     faults: dict[str, str] = {}
     for field in fields:
         text = posted.get(field.key, field.text).strip()
-        if text in (field.text, ""):
+        if text in (field.text, "") or field.key.startswith(tuple(f"{key}." for key in off)):
             continue
         try:
             result.append(Change(field.key, _value(field, text)))
@@ -69,16 +74,30 @@ def changes(
 def command_line(scene: str, changed: Iterable[Change], speed: str, view: bool) -> list[str]:
     """Return the words of the command that runs a scene with these changes."""
     words = ["lapwing", "run", scene]
-    for change in changed:
+    for change in _merged(changed):
         words += ["--set", change.override]
     return [*words, *(["--speed", speed] if speed else []), *(["--view"] if view else [])]
 
 
 def python(scene: str, changed: Iterable[Change]) -> str:
     """Return Python code that runs a scene with these changes."""
-    lines = [f"    {change.key!r}: {change.value!r},\n" for change in changed]
+    lines = [f"    {change.key!r}: {change.value!r},\n" for change in _merged(changed)]
     overrides = ", {\n" + "".join(lines) + "}" if lines else ""
     return f"import lapwing\n\nflight = lapwing.fly({scene!r}{overrides})\nprint(flight.outcome)\nflight.report()\n"
+
+
+def _merged(changed: Iterable[Change]) -> list[Change]:
+    """Return changes that name an added table only where none of its keys is changed."""
+    changes = list(changed)
+    own = {change.key for change in changes}
+    result = []
+    for change in changes:
+        if isinstance(change.value, dict) and any(key.startswith(f"{change.key}.") for key in own):
+            rest = {f"{change.key}.{key}": value for key, value in change.value.items()}
+            result += [Change(key, value) for key, value in rest.items() if key not in own]
+        else:
+            result.append(change)
+    return result
 
 
 def _value(field: Field, text: str) -> Any:
@@ -106,6 +125,7 @@ def _is_word(text: str) -> bool:
     return text in ("true", "false", "inf", "nan")
 
 
+MOST_PLACES = 300  # largest number of drawn places of a path, about
 MOST_FIELDS = 5000  # largest number of fields of a posted form
 
 
@@ -155,6 +175,18 @@ def toml_text(name: str, changed: Iterable[Change]) -> str:
 def tables(keys: Iterable[str]) -> list[Change]:
     """Return the changes that add tables, with values of their required keys."""
     return [Change(key, starting_values(schema(), key)) for key in keys]
+
+
+def tracks(scene: Scene) -> list[list[tuple[float, ...]]]:
+    """Return the path that the trajectory of each vehicle orders: places [m], world."""
+    result = []
+    for member in members(resolve(scene)):
+        service = member.services.get(TRAJECTORY)
+        if service is not None and isinstance(service.parameters, TrajectoryConfig):
+            places = [place for _, _, *place in service.parameters.track(member.duration)]
+            shown = places[:: max(1, len(places) // MOST_PLACES)] + places[-1:]
+            result.append([tuple(round(value, 2) for value in place) for place in shown])
+    return result
 
 
 async def posted_form(request: Request) -> tuple[str, dict[str, str], tuple[str, ...]]:

@@ -55,7 +55,8 @@
   if (form) {
     let timer = 0, latest = 0;
     const named = (key) => all("[data-key]", form).find((field) => field.dataset.key === key);
-    const show = ({ command, python, toml, changed, faults, error }) => {
+    const show = ({ command, python, toml, changed, faults, error, paths }) => {
+      if (!error && !Object.keys(faults).length) form.dispatchEvent(new CustomEvent("paths", { detail: paths }));
       document.querySelector("#toml").textContent = toml || "# no changes";
       document.querySelector("#command").textContent = command;
       document.querySelector("#python").textContent = python;

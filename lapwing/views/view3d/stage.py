@@ -98,8 +98,9 @@ class Vehicle:
                 rotors.set_thrusts(body.thrusts[k])
         position = samples.bodies[0].position[k]
         if samples.wind is not None:
-            node = self._node("wind", lambda name: self._arrow(name, WIND, 0.035 * self._size))
-            self._point(node, raise_point(position, 0.75 * self._size), samples.wind[k], WIND_SCALE, k)
+            tint, above = (self.colour, 1.1) if self._is_ghost else (WIND, 0.75)  # two flights may be in one place
+            node = self._node("wind", lambda name: self._arrow(name, tint, 0.035 * self._size))
+            self._point(node, raise_point(position, above * self._size), samples.wind[k], WIND_SCALE, k)
         self._show_ghosts(samples, k)
         self._show_forces(samples, k)
         for beam in samples.beams:

@@ -87,9 +87,19 @@ def test_rejections_name_reason():
             command("parameter", 1e9, text="MPC_XY_CRUISE", id=6),
             command("parameter", 3.0, text="MPC_XY_CRUISE", id=7),
         ],
+        0.4: [command("return", id=8)],
     }
     flight = fly(0.5, script)
-    assert results(flight) == {1: REJECTED, 2: REJECTED, 3: REJECTED, 4: DENIED, 5: 3, 6: DENIED, 7: ACCEPTED}
+    assert results(flight) == {
+        1: REJECTED,
+        2: REJECTED,
+        3: REJECTED,
+        4: DENIED,
+        5: 3,
+        6: DENIED,
+        7: ACCEPTED,
+        8: REJECTED,
+    }
     assert "mission: no mission is uploaded; upload one first" in sent_texts(flight)
     assert any("MPC_XY_CRUISE: expected a number from 0.1 to 20" in text for text in sent_texts(flight))
 

@@ -50,9 +50,14 @@ def test_keys_in_which_two_scenes_differ():
     other = {"effects": {"wind": {"sigma": 2.0}}, "run": {"seed": 1}}
     assert differences(one, other) == {"effects.gravity": ("yes", ""), "effects.wind.sigma": ("1", "2")}
     assert differences({"published": {"rmse": {"x": 1.0}}, "run": {"title": "a"}}, {"run": {"title": "b"}}) == {}
-    many = differences({str(k): k for k in range(MANY + 3)}, {})
-    assert len(many) == MANY + 1
-    assert "3 more" in many
+    one = {"box": [{"top": 3.0, "open": True}, {"top": 2.0}], "points": [[0.0, 1.5]]}
+    assert differences(one, {}) == {
+        "box.1.top": ("3", ""),
+        "box.1.open": ("true", ""),
+        "box.2.top": ("2", ""),
+        "points": ("[[0, 1.5]]", ""),
+    }
+    assert len(differences({str(k): k for k in range(MANY + 3)}, {})) == MANY + 3
 
 
 def test_map_shows_both_flights_and_errors_only_armed_time():

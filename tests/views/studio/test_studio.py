@@ -137,6 +137,36 @@ def test_preview_names_command_python_and_faults(studio):
     assert answer["faults"] == {"run.duration": "expected a number above 0 and at most 1e+06 [s], got -1.0"}
 
 
+def preview(studio, scene, fields):
+    return json.loads(studio.request(f"scenes/{scene}/preview", fields)[1])
+
+
+def test_preview_names_values_of_an_added_effect_once(studio):
+    added = {"add": "effects.wind_constant"}
+    answer = preview(studio, "hover", {**added, "effects.wind_constant.velocity": "[3.0, 0.0, 0.0]", "speed": "1"})
+    velocity = "effects.wind_constant.velocity"
+    assert answer["command"] == f"lapwing run hover --set '{velocity}=[3.0, 0.0, 0.0]' --speed 1"
+    assert answer["python"].count("wind_constant") == 1
+    assert "wind_constant={velocity = [0.0, 0.0, 0.0]}" in preview(studio, "hover", added)["command"]
+
+
+def test_effect_or_sensor_is_switched_off(studio):
+    page = studio.page("scenes/delivery_mission?set=effects.random_wind_force%3Dfalse")
+    assert re.search(r'name="effects.random_wind_force" value="false" checked', page)
+    off = {"effects.random_wind_force": "false", "effects.random_wind_force.mean": "[1.0, 0.0, 0.0]"}
+    answer = preview(studio, "delivery_mission", off)
+    assert (answer["error"], answer["faults"]) == ("", {})
+    assert answer["command"] == "lapwing run delivery_mission --set effects.random_wind_force=false"
+    assert tomllib.loads(answer["toml"]) == {"effects": {"random_wind_force": False}}
+
+
+def test_preview_has_the_path_of_a_trajectory_of_phases(studio):
+    ((start, *_, end),) = preview(studio, "delivery_mission", {})["paths"]
+    assert start[:2] == [0.0, 0.0]
+    assert end == pytest.approx([10.0, 10.0, start[2]], abs=0.3)
+    assert len(preview(studio, "fleet", {})["paths"]) == 3
+
+
 def test_faulty_form_is_returned_with_fault(studio):
     status, text, _ = studio.request("scenes/hover/run", {**QUICK, "run.seed": "-3"})
     assert status == 422
