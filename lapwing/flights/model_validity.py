@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lapwing.flights.saturation import intervals
+from lapwing.flights.saturation import intervals, percent
 from lapwing.flights.topic_view import TopicView
 
 SHORTEST = 0.5  # [s] total time below which a warning is suppressed, except for currents
@@ -76,8 +76,8 @@ def _warning(truth: TopicView, where: np.ndarray, name: str, consequence: str) -
         return []
     result = intervals(where, truth.times)
     times = f" ({len(result)} times)" if len(result) > 1 else ""
-    share = 100.0 * min(1.0, seconds / max(flight, 1e-9))
-    text = f"{name} for {seconds:.1f} s{times}, {share:.2g} % of the time in the air: {consequence}"
+    share = percent(min(1.0, seconds / max(flight, 1e-9)))
+    text = f"{name} for {seconds:.1f} s{times}, {share} of the time in the air: {consequence}"
     return [ValidityWarning(float(truth.times[result[0][0]]), text)]
 
 
