@@ -52,7 +52,7 @@ def _unlimited_current(truth: TopicView, scene: dict[str, Any]) -> list[Validity
         return []
     current = np.where(truth.ground_contact[:, None], 0.0, winding_current(truth, motor))
     over = np.flatnonzero((current > limit).any(axis=1))
-    text = f"motors take up to {current.max(initial=0.0):.3g} A, rated {limit:g} A; dc_motor limits it"
+    text = f"motors take up to {current.max(initial=0.0):.3g} A, rated {limit:g} A; add effect dc_motor"
     return [ValidityWarning(float(truth.times[k]), text) for k in over[:1]]  # one line of a terminal of 80 columns
 
 
