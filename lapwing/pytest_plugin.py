@@ -46,8 +46,8 @@ def fly_scene(request: pytest.FixtureRequest) -> "Callable[..., Flight]":
         flights.append(flight)
         if flight.failure:
             pytest.fail(f"the simulation ended early: {flight.failure}")
-        if success and (unmet := loaded[Success].unmet(metrics(flight))):
-            pytest.fail(f"{flight.outcome}; success.require: {'; '.join(unmet)}")
+        if success and (shortfall := loaded[Success].shortfall(metrics(flight))):
+            pytest.fail(f"{flight.outcome}; success.require: {shortfall}")
         return flight
 
     return fly

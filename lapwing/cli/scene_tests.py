@@ -51,7 +51,8 @@ def scene_tests(
     suite.attrib |= {"tests": str(len(kinds)), "failures": str(failures), "errors": str(errors)}
     if junit:
         ElementTree.ElementTree(suite).write(junit, encoding="utf-8", xml_declaration=True)
-    typer.echo(f"{len(kinds) - failures - errors} passed, {failures} failed, {errors} errors")
+    plural = "" if errors == 1 else "s"
+    typer.echo(f"{len(kinds) - failures - errors} passed, {failures} failed, {errors} error{plural}")
     if errors or failures:
         raise SystemExit(1 if errors else FLIGHT_FAILED)
 
@@ -73,10 +74,10 @@ def _result(path: Path, keep: Path) -> tuple[str, str]:
     try:
         scene = load_scene(path)
         flight = fly(scene)
-        unmet = [] if flight.failure else scene[Success].unmet(metrics(flight))
+        shortfall = "" if flight.failure else scene[Success].shortfall(metrics(flight))
     except ValueError as error:
         return BROKEN, str(error)
-    if not (flight.failure or unmet):
+    if not (flight.failure or shortfall):
         return PASSED, ""
     keep.mkdir(parents=True, exist_ok=True)
     log = flight.save(keep / f"{path.stem}.mcap")
@@ -84,4 +85,4 @@ def _result(path: Path, keep: Path) -> tuple[str, str]:
         flight.report(log.with_suffix(".html"), view3d=False)
     if flight.failure:
         return BROKEN, f"the simulation ended early: {flight.failure} ({log})"
-    return FAILED, f"{flight.outcome.kind}; success.require: {'; '.join(unmet)} ({log})"
+    return FAILED, f"{flight.outcome.kind}; success.require: {shortfall} ({log})"

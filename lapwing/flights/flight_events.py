@@ -9,7 +9,7 @@ import numpy as np
 from lapwing.flights.contacts import Touch
 from lapwing.flights.model_validity import validity_warnings
 from lapwing.flights.outcome import FlightOutcome
-from lapwing.flights.saturation import description, highest_voltage, intervals, saturation
+from lapwing.flights.saturation import description, highest_voltage, intervals, percent, saturation
 from lapwing.flights.tension import link_tension, pushes
 from lapwing.flights.topic_view import TopicView
 from lapwing.messages import CommandAck, CommandAcks, header
@@ -231,6 +231,6 @@ def _saturation(truth: TopicView, armed: np.ndarray, highest: float) -> Iterator
     if not times:
         return
     count = f" ({len(times)} times)" if len(times) > 1 else ""
-    share = f"{100.0 * result.share(result.lasted):.2g} % of the time in the air"
+    share = f"{percent(result.share(result.lasted))} of the time in the air"
     where = description(result.low, result.high, highest)
     yield Event(float(t[times[0][0]]), "motors", f"{where} for {result.lasted:.2f} s{count}, {share}")

@@ -4,7 +4,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from lapwing.flights.saturation import intervals
+from lapwing.flights.saturation import intervals, percent
 from lapwing.flights.topic_view import TopicView
 
 SHORTEST = 0.5  # [s] total time below which a warning is suppressed, except for currents
@@ -52,7 +52,7 @@ def _unlimited_current(truth: TopicView, scene: dict[str, Any]) -> list[Validity
         return []
     current = np.where(truth.ground_contact[:, None], 0.0, winding_current(truth, motor))
     over = np.flatnonzero((current > limit).any(axis=1))
-    text = f"motors take up to {current.max(initial=0.0):.3g} A, rated {limit:g} A; dc_motor limits it"
+    text = f"motors take up to {current.max(initial=0.0):.3g} A, rated {limit:g} A; add effect dc_motor"
     return [ValidityWarning(float(truth.times[k]), text) for k in over[:1]]  # one line of a terminal of 80 columns
 
 
@@ -76,8 +76,8 @@ def _warning(truth: TopicView, where: np.ndarray, name: str, consequence: str) -
         return []
     result = intervals(where, truth.times)
     times = f" ({len(result)} times)" if len(result) > 1 else ""
-    share = 100.0 * min(1.0, seconds / max(flight, 1e-9))
-    text = f"{name} for {seconds:.1f} s{times}, {share:.2g} % of the time in the air: {consequence}"
+    share = percent(min(1.0, seconds / max(flight, 1e-9)))
+    text = f"{name} for {seconds:.1f} s{times}, {share} of the time in the air: {consequence}"
     return [ValidityWarning(float(truth.times[result[0][0]]), text)]
 
 

@@ -78,7 +78,7 @@ def description(low: np.ndarray, high: np.ndarray, highest: float) -> str:
     limits = ((low, "0 V"), (high, f"{highest:g} V"))
     found = [(_motors(np.asarray(at.any(axis=0))), limit) for at, limit in limits if at.any()]
     if len(found) == 2 and found[0][0] == found[1][0]:
-        return f"{found[0][0]} at the limits of {found[0][1]} and {found[1][1]}"
+        return f"{found[0][0]} at the limit of {found[0][1]} or {found[1][1]}"
     return ", ".join(f"{motors} at the limit of {limit}" for motors, limit in found)
 
 
@@ -89,9 +89,14 @@ def spans(result: Saturation, t: np.ndarray, highest: float) -> list[tuple[str, 
         rows = slice(start, stop)
         lasted = float(result.step[rows][at_limit[rows]].sum())
         motors = description(result.low[rows], result.high[rows], highest)
-        text = f"{motors} for {lasted:.2f} s, {100.0 * result.share(lasted):.2g} % of the time in the air"
+        text = f"{motors} for {lasted:.2f} s, {percent(result.share(lasted))} of the time in the air"
         listed.append((text, float(t[start]), float(t[min(stop, len(t) - 1)])))
     return listed
+
+
+def percent(share: float) -> str:
+    """Return a share, 0..1, in percent with two digits: "0.49 %", "100 %"."""
+    return f"{float(f'{100.0 * share:.2g}'):g} %"
 
 
 def _motors(affected: np.ndarray) -> str:

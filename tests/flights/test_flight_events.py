@@ -101,7 +101,12 @@ def test_saturation_of_all_motors_is_named_once():
     voltage = np.full((TICKS, 4), 20.0)
     voltage[120:130], voltage[130:140] = 40.0, 0.0
     (event,) = [event for event in example_flight(voltage).events if event.kind == "motors"]
-    assert event.text == "all motors at the limits of 0 V and 40 V for 0.20 s, 6.7 % of the time in the air"
+    assert event.text == "all motors at the limit of 0 V or 40 V for 0.20 s, 6.7 % of the time in the air"
+
+
+def test_saturation_of_an_entire_flight_is_100_percent():
+    (event,) = [event for event in example_flight(np.full((TICKS, 4), 40.0)).events if event.kind == "motors"]
+    assert event.text.endswith(", 100 % of the time in the air")
 
 
 def test_timeline_shows_each_span_of_saturation_with_its_share():

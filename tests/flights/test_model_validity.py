@@ -94,7 +94,7 @@ def test_unlimited_motor_current_is_reported(peak, effects, count):
     scene = {"airframe": {"motor": {**MOTOR, "peak_current": peak}}, "effects": effects}
     warnings = [event for event in flown((0.0, 0.0, 0.0), scene=scene).events if event.kind == "warning"]
     assert len(warnings) == count
-    text = "motors take up to 66.8 A, rated 66 A; dc_motor limits it"
+    text = "motors take up to 66.8 A, rated 66 A; add effect dc_motor"
     assert all(warning.text == text for warning in warnings)
 
 
@@ -103,4 +103,4 @@ def test_run_of_paper_mission_names_unlimited_current():
     """Mission of the paper as flown: 311 A, as found by hand from voltages and speeds."""
     flight = lapwing.fly("delivery_paper")
     (warning,) = [event for event in flight.events if event.kind == "warning"]
-    assert warning.text == "motors take up to 311 A, rated 26.5 A; dc_motor limits it"
+    assert warning.text == "motors take up to 311 A, rated 26.5 A; add effect dc_motor"

@@ -29,7 +29,8 @@ def test_command_tells_failed_vehicle_from_failed_simulation(tmp_path):
     assert suite.attrib == {"name": "scenes", "tests": "3", "failures": "1", "errors": "1"}
     cases = {case.get("name"): [child.tag for child in case] for case in suite}
     assert cases == {"bad": ["failure"], "good": [], "invalid": ["error"]}
-    assert "success.require: max_tilt > 1.0" in suite.find("testcase/failure").get("message")
+    assert "success.require: max_tilt > 1.0 (max_tilt is " in suite.find("testcase/failure").get("message")
+    assert result.stdout.endswith("1 passed, 1 failed, 1 error\n")
     assert "did you mean gravity?" in suite.find("testcase/error").get("message")
 
 

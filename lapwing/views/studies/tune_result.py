@@ -89,7 +89,7 @@ def _cells(m: Margins) -> tuple[str, ...]:
 
 
 def _margins(tuning: Tuning) -> Rows:
-    heads = ("loop", "gains", "crossover,\nrad/s", "phase\nmargin, °", "gain\nmargin, dB", "reduction,\ndB")
+    heads = ("loop", "gains", "crossover\nrad/s", "phase\nmargin\n°", "gain\nmargin\ndB", "reduction\ndB")
     rows = Rows(f"Margins of the loops before ({tuning.before.name}) and after", *heads, caption=_MARGINS)
     for name in tuning.after.margins:
         for review in (tuning.before, tuning.after):

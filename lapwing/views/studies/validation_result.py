@@ -118,9 +118,10 @@ def _heads(names: list[str]) -> list[str]:
 
 def _ratio(comparison: Comparison, baseline: str) -> str:
     ratio = comparison.ratios[baseline]
+    mean, low, high = ("<0.01" if x < 0.005 else f"{x:.2f}" for x in (ratio.mean, ratio.low, ratio.high))
     if not math.isfinite(ratio.low):
-        return f"{ratio.mean:.2f}"
-    return f"{ratio.mean:.2f} [{ratio.low:.2f}, {ratio.high:.2f}] {comparison.outcome(baseline)}"
+        return mean
+    return f"{mean} [{low}, {high}] {comparison.outcome(baseline)}"
 
 
 def error_table(validation: Validation) -> Rows:

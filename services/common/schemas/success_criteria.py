@@ -59,6 +59,15 @@ class Success(SceneTable):
         """Return the expressions that do not hold for these metrics."""
         return [text for text in self.require if not holds(text, figures)]
 
+    def shortfall(self, figures: Mapping[str, Any]) -> str:
+        """Return the expressions that do not hold, with the values of their numbers: "rmse.x < 0.1 (rmse.x is 0.2)"."""
+        texts = []
+        for text in self.unmet(figures):
+            names = sorted(_expression(text).names - TEXTS)
+            values = ", ".join(f"{name} is {figures[name]:.4g}" for name in names)
+            texts.append(f"{text} ({values})" if values else text)
+        return "; ".join(texts)
+
 
 class _Expression(NamedTuple):
     code: CodeType

@@ -12,13 +12,13 @@ from lapwing.views.studies.study_result import show
 from lapwing.views.studies.validation_result import error_table, validation_result
 
 
-def validation(interval):
+def validation(interval, error=1.234):
     """Return the errors of two horizons: the smallest and largest numbers of letters, and no power."""
     nan = math.nan
     metric = Metric(1.23e-07, *((1.11e-07, 0.000134) if interval else (nan, nan)))
     row = [Metric(nan, nan, nan) if name == "power" else metric for name in FIELDS]
     baselines = {"constant_velocity": [row, row], "linear_fit": [row, row]}
-    ratio = Metric(1.234, *((1.123, 1.345) if interval else (nan, nan)))
+    ratio = Metric(error, *((error * 1.123 / 1.234, error * 1.345 / 1.234) if interval else (nan, nan)))
     ratios = {name: [[ratio if math.isfinite(m.mean) else m for m in row]] * 2 for name in baselines}
     noise = np.zeros((2, len(FIELDS)))
     return Validation(
@@ -40,3 +40,13 @@ def test_every_cell_has_one_complete_number(interval):
     assert "…" not in text
     assert text.count("1.23e-07") == 2 * (len(FIELDS) - 1) * 3
     assert text.count("1.23 [1.12, 1.34] worse") == (2 * (len(FIELDS) - 1) * 2 if interval else 0)
+
+
+@pytest.mark.parametrize("interval", [True, False])
+def test_small_ratio_is_not_zero(interval):
+    console = Console(record=True, width=80)
+    show(console, validation_result(validation(interval, error=0.001)))
+    text = console.export_text()
+    assert "0.00 " not in text
+    assert ("<0.01 [<0.01, <0.01] better" if interval else " <0.01 ") in text
+    assert "…" not in text

@@ -4,7 +4,7 @@ import numpy as np
 
 from lapwing.flights.battery_use import WATT_HOUR
 from lapwing.flights.flight_data import FlightData
-from lapwing.flights.saturation import highest_voltage, saturation
+from lapwing.flights.saturation import highest_voltage, percent, saturation
 from lapwing.views.report.flight_phases import over
 from lapwing.views.report.plot import Level, Line, NotRecordedError, Panel, Plot, column
 from lapwing.views.report.style import BOUND, COLOURS, STEERED
@@ -57,7 +57,7 @@ def limits(flight: FlightData) -> tuple[tuple[Level | Line, ...], str]:
     marks = (*_limit_lines(t, saturated.low, 0.0), *_limit_lines(t, saturated.high, highest))
     return (*levels, *marks), (
         f"Marked: a motor is at a voltage limit (0 or {highest:g} V) in the air, in total for "
-        f"{saturated.lasted:.2f} s, {100.0 * saturated.share(saturated.lasted):.2g} % of that time."
+        f"{saturated.lasted:.2f} s, {percent(saturated.share(saturated.lasted))} of that time."
     )
 
 
