@@ -136,7 +136,7 @@ def _lift(known: Values) -> tuple[float, str]:
         ConfigError: the figures contradict each other, or the vehicle cannot hover; its key is a figure.
     """
     from lapwing.cli.airframe_writer import airframe_of
-    from lapwing.cli.vehicle_estimates import estimate
+    from lapwing.cli.vehicle_estimates import check_fit, estimate
     from lapwing.dynamics.constants import STANDARD_GRAVITY
     from lapwing.dynamics.vehicles.performance import limited_thrust
 
@@ -152,6 +152,7 @@ def _lift(known: Values) -> tuple[float, str]:
         cause = next((cause for cause in causes if cause in known), "mass")
         expected = f"more lift by {', '.join(causes)}, or less mass"
         raise ConfigError(cause, f"the thrust is {ratio:.2f} times the weight, limited by {reason}", expected)
+    check_fit(known)
     return ratio, f"{reason} ({', '.join(causes)})"
 
 

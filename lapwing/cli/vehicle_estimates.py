@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from lapwing.cli.vehicle_measurements import Values
+from lapwing.cli.vehicle_measurements import BY_NAME, Values
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.constants import STANDARD_GRAVITY
 from lapwing.dynamics.vehicles.airframe_tables import Propeller
@@ -34,6 +34,7 @@ WEAK = 1.4  # thrust over weight below which control authority is small
 ENOUGH = math.sqrt(1.15 * WEAK)  # speed at full throttle over that in hover of a vehicle that is not weak
 LEAST_SHARE = 0.8  # typical speed at full throttle over that without load
 USUAL, TIGHT = 0.2, 0.02  # spreads of HOVER_SHARE; the second is used where the first gives a weak vehicle
+MOST_UNUSUAL = 20.0  # ratio of an estimate to its usual value, beyond which known figures contradict each other
 CURRENT, CURRENT_MARGIN = "current", 1.2  # smallest limit of a motor's current over the current at full throttle
 Relation = tuple[
     str, float, dict[str, float], float
@@ -55,6 +56,33 @@ def estimate(known: Values) -> dict[str, float]:
     _fit_inertia(v, known)
     _fit_propeller(v, known)
     return _with_electrics(v, known)
+
+
+def check_fit(known: Values) -> None:
+    """Raise ConfigError for a figure that the others contradict: an estimate is far from that of any usual vehicle."""
+    ratio, name, value, usual = _farthest(known)
+    if ratio > MOST_UNUSUAL:
+        others = {cause: {other: known[other] for other in known if other != cause} for cause in known}
+        usual_vehicle = estimate({})
+        causes = [each for each in known if _farthest(others[each])[0] <= MOST_UNUSUAL] or list(known)
+        cause = max(causes, key=lambda each: abs(math.log((known[each] or 1.0) / (usual_vehicle[each] or 1.0))))
+        expected = f"about {estimate(others[cause])[cause]:.2g}, or others that fit it"
+        message = f"{known[cause]:g} {BY_NAME[cause].unit} needs {name} = {value:.3g}, where about {usual:.2g} is usual"
+        raise ConfigError(cause, message, expected)
+
+
+def _farthest(known: Values) -> tuple[float, str, float, float]:
+    """Return the estimate farthest from a typical relation: its ratio to the usual value, name, value, usual value."""
+    v, farthest = estimate(known), (1.0, "", 0.0, 0.0)
+    v.pop(CURRENT, None)
+    for figure, factor, powers, _ in _relations(v, USUAL):
+        exponents = {figure: 1.0, **{name: -power for name, power in powers.items()}}
+        excess = sum(exponent * math.log(v[each]) for each, exponent in exponents.items()) - math.log(factor)
+        name = next((name for name in exponents if powers and name not in known), "")  # any mass is usual
+        ratio = math.exp(abs(excess / exponents[name])) if name else 1.0
+        if ratio > farthest[0] and not (name == "cells" and v[name] == 1.0):
+            farthest = ratio, name, v[name], v[name] * math.exp(-excess / exponents[name])
+    return farthest
 
 
 def propeller(v: Values) -> Propeller:

@@ -21,7 +21,7 @@ from lapwing.services import process_table
 from lapwing.services.process_main import ProcessSpec, write_spec
 
 SLOW, GAIN = 5.0, 2.0  # [s] wall time, and its ratio to the time in one process, above which that mode is advised
-NOTICE = 5.0  # [s] after which participants that are started elsewhere and have not joined are named
+NOTICE = 5.0  # [s] after which participants and programs from elsewhere are named that have not joined or answered
 
 
 def fly_processes(
@@ -100,6 +100,7 @@ class Clock:
         self._elsewhere, self._created = set(elsewhere), time.monotonic()
         self._observer, self._started, self._waiting, self._slow_disk = observer, False, False, False
         self._pose, self._status = primary_topic(config, POSE), primary_topic(config, STATUS)
+        self._progress = -1, 0.0  # newest simulated time [ns], and when it was reached [s]
         self._compilation: Compilation | None = Compilation.of(config)  # None after it was shown
         self.elapsed, self.rejected = Elapsed(0.0, 0.0), 0
         self._block_times: dict[str, float] = {}
@@ -125,9 +126,18 @@ class Clock:
         if watch.slow_disk and not self._slow_disk:
             self._slow_disk = True
             self._observer.say("the disk is slow: the run waits until its log is written")
+        self._name_outside(watch)
         self.elapsed = Elapsed(watch.time_ns * 1e-9, watch.wall)
         self._observer.show(watch.time_ns, watch.newest.get(self._pose), watch.newest.get(self._status))
         return False
+
+    def _name_outside(self, watch: RunMonitor) -> None:
+        """Say once for which program a service waits while the simulated time does not advance."""
+        if watch.time_ns != self._progress[0]:
+            self._progress, self._waiting = (watch.time_ns, time.monotonic()), False
+        elif watch.outside and not self._waiting and time.monotonic() - self._progress[1] > NOTICE:
+            self._waiting = True
+            self._observer.say(f"waiting for {watch.outside}")
 
     def faster_mode(self, services: Collection[str]) -> str:
         """Return the advice for the next run after a flight that was slow because its processes exchange data.

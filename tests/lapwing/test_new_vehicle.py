@@ -126,6 +126,8 @@ def test_figure_far_from_its_guess_is_warned_of(tmp_path):
         ("diameter=15", "diameter=15: 15 m, where about 0.26 is usual; expected 15in, or 15m if that is right"),
         ("mass=5 arm=40", "arm=40: 40 m, where about 0.36 is usual; expected 40cm, or 40m if that is right"),
         ("mass=750", "mass=750: 750 kg, where about 2 is usual; expected 750g, or 750kg if that is right"),
+        ("mass=750g esc_current=30mA", "esc_current: 0.03 A needs cells = 112, where about 2.4 is usual; expected"),
+        ("mass=750g cells=4S esc_current=30mA", "esc_current: 0.03 A needs "),
         ("stand_speed=6000", "stand_speed=6000: 6000 rad/s, where about 610 is usual; expected 6000rpm, or 6000rad/s"),
     ],
 )

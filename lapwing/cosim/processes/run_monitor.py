@@ -157,6 +157,7 @@ class RunMonitor:
             return
         self.last_news = time.monotonic()
         self.waiting.clear()
+        self.outside = ""
         self.start = self.start or self.last_news
         self.wall = self.last_news - self.start
         self._times[name] = max(time_ns, self._times.get(name, 0))

@@ -249,6 +249,21 @@ def test_run_in_lock_step_says_for_which_node_it_waits(tmp_path, port):
         run.communicate(timeout=PATIENCE)
 
 
+def test_run_in_lock_step_says_for_which_node_it_waits_in_flight(tmp_path, port, diagram):
+    words = ["--set", "ros2.lock_step=true", "--set", "autopilot.estimator=ground_truth", "--set", "run.duration=900"]
+    run = fly(tmp_path, port, *words, "--speed", "4", domain=0)
+    node = subprocess.Popen([sys.executable, "-c", NODE, *map(str, (tmp_path / "msg", 0.0, port))])
+    try:
+        lines = iter(run.stdout.readline, "")
+        assert any(line.startswith("t = ") for line in lines)
+        node.kill()
+        assert any(line.startswith("waiting for the command of a ROS 2 node for drone1 with stamp ") for line in lines)
+    finally:
+        run.kill()
+        node.kill()
+        run.communicate()
+
+
 def test_lock_step_without_commanded_vehicle_is_rejected(tmp_path, port):
     done = run_command("run", "hover", "--ros2", "0", "--ros2-router", f"127.0.0.1:{port}", "--speed", "max",
                        "--set", "ros2.lock_step=true", "--log", tmp_path / "a.mcap", code=2)  # fmt: skip
