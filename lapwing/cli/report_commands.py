@@ -55,7 +55,7 @@ def view(
     from lapwing.views.rerun_export import open_in_rerun
 
     if rerun:
-        open_in_rerun(log)
+        typer.echo(open_in_rerun(log))
         return
     page = Flight.read(log, only=SHOWN).report()
     if not webbrowser.open(page.resolve().as_uri()):

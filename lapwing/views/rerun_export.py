@@ -19,8 +19,8 @@ def program() -> str | None:
     return shutil.which("rerun", path=str(Path(sys.executable).parent)) or shutil.which("rerun")
 
 
-def open_in_rerun(log: Path) -> None:
-    """Write a Rerun recording next to a log, and start the viewer in the background.
+def open_in_rerun(log: Path) -> Path:
+    """Write a Rerun recording next to a log, start the viewer in the background, and return the recording's path.
 
     Raises:
         ValueError: not a log, or Rerun is not installed.
@@ -33,6 +33,7 @@ def open_in_rerun(log: Path) -> None:
     target = log.with_suffix(".rrd")
     convert(log, topics, target)
     subprocess.Popen([result, "--bind", "127.0.0.1", str(target)], start_new_session=True)
+    return target
 
 
 def convert(log: Path, topics: set[str], target: Path) -> None:

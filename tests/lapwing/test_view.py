@@ -55,13 +55,14 @@ def test_rerun_converts_log_of_all_sensors_without_warning(tmp_path):
 
 
 @pytest.mark.skipif(rerun.program() is None, reason="needs Rerun (pip install lapwing[view])")
-def test_rerun_opens_recording_that_begins_with_blueprint(lapwing, log, monkeypatch):
+def test_rerun_opens_recording_that_begins_with_blueprint(lapwing, monkeypatch, tmp_path):
     pytest.importorskip("rerun")
+    log = _fly("delivery_mission", tmp_path)
     started = []
     monkeypatch.setattr(subprocess, "Popen", lambda command, **_: started.append(command))
     code, out, err = lapwing("view", log, "--rerun")
     recording = log.with_suffix(".rrd")
-    assert (code, out, err) == (0, "", "")
+    assert (code, out, err) == (0, f"{recording}\n", "")
     assert started == [[rerun.program(), "--bind", "127.0.0.1", str(recording)]]
     monkeypatch.undo()
     command = [rerun.program(), "rrd", "print", "-vv", str(recording)]

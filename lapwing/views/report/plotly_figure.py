@@ -306,7 +306,8 @@ def _array(values: np.ndarray, log: bool = False, shown: tuple[float, float] | N
     low, high = (float(f(values[finite])) if finite.any() else 0.0 for f in (np.min, np.max))
     step = (high - low) / (2 * STEPS)
     if log or (shown is not None and step > abs(shown[1] - shown[0]) / 4000):
-        data = np.ascontiguousarray(values, dtype="<f4").tobytes()
+        largest = np.finfo("<f4").max
+        data = np.ascontiguousarray(values.clip(-largest, largest), dtype="<f4").tobytes()
         return {"dtype": "f4", "bdata": base64.b64encode(data).decode("ascii")}
     counts = np.zeros(len(values)) if step == 0.0 else np.round((np.where(finite, values, low) - low) / step) - STEPS
     changes = np.diff(np.where(finite, counts, -STEPS - 1).astype("<i2"), prepend=np.int16(0)).astype("<i2")

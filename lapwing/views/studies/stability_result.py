@@ -53,8 +53,9 @@ def _rows(each: Result) -> Rows:
     rows = Rows(f"{each.case}: {each.hard} ({each.seconds:.1f} s)", *HEADS, texts=TEXTS)
     for row in each.figures.rows:
         baseline = f"{_number(row.baseline_measured)} ({_verdict(row.baseline_passes)})"
+        invariant = f"{row.name}: {row.invariant}"
         rows.add(
-            f"{row.invariant}; bound: {row.why}" if row.why else row.invariant, row.method, _number(row.bound),
+            f"{invariant}; bound: {row.why}" if row.why else invariant, row.method, _number(row.bound),
             _number(row.measured), distance(row.bound, row.measured), _verdict(row.passes), row.baseline, baseline,
             failed=not row.is_conclusive,
         )  # fmt: skip
@@ -96,4 +97,5 @@ def distance(bound: float, measured: float) -> str:
         return ""
     if measured == 0.0:
         return "exact"
-    return f"{bound / measured:.3g} x" if measured > 0.1 * bound else f"{bound / measured:.1g} x"
+    digits = 3 if measured > 0.1 * bound else 1
+    return f"{float(f'{bound / measured:.{digits}g}'):g} x"

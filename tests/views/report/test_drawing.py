@@ -31,6 +31,11 @@ def test_array_beyond_its_axis_keeps_resolution_of_axis():
     assert values(plotly_figure._array(inputs, shown=(0.0, 1.0))) == pytest.approx(inputs, rel=1e-6, abs=1e-7)
 
 
+def test_array_of_a_diverged_curve_ends_at_largest_number():
+    inputs = np.append(np.ones(50), 1e302)
+    assert values(plotly_figure._array(inputs, log=True))[-1] == pytest.approx(np.finfo("<f4").max)
+
+
 def test_reduced_script_keeps_registered_kinds_of_traces():
     reduced = plotly_script.remove_unused_traces(plotly_script.script())
     kinds = set(re.findall(r'moduleType:"trace",name:"(\w+)"', reduced))
