@@ -119,7 +119,7 @@ def basis(validation: Validation) -> str:
         return f"no intervals: they need {FEWEST_CLUSTERS * BLOCK:g} s of flight"
     if len(validation.flights) < FEWEST_FLIGHTS:
         return (
-            f"95 % intervals for flights like these, over blocks of {BLOCK:g} s; over flights from {FEWEST_FLIGHTS} on"
+            f"95 % intervals for flights like these, over blocks of {BLOCK:g} s (over flights from {FEWEST_FLIGHTS} on)"
         )
     return f"95 % intervals over {len(validation.flights)} flights"
 

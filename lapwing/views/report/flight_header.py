@@ -55,14 +55,17 @@ def differences(one: dict[str, Any], other: dict[str, Any]) -> dict[str, tuple[s
 
 
 def _leaves(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]]:
-    """Yield dotted key and value of all leaves; an empty table, such as an effect without keys, is "yes"."""
+    """Yield dotted key and value of all leaves without empty lists; an effect or sensor without keys is "yes"."""
     for key, value in table.items():
         if isinstance(value, list | tuple) and value and all(isinstance(item, dict) for item in value):
             value = {str(k): item for k, item in enumerate(value, 1)}
         if isinstance(value, dict) and value:
             yield from _leaves(value, f"{prefix}{key}.")
-        else:
-            yield f"{prefix}{key}", "yes" if isinstance(value, dict) else value
+        elif isinstance(value, dict):
+            if prefix:
+                yield f"{prefix}{key}", "yes"
+        elif value is not None and value != []:
+            yield f"{prefix}{key}", value
 
 
 def uses_gains(scene: dict[str, Any]) -> bool:

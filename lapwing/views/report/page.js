@@ -44,13 +44,14 @@
   scheme.addEventListener("change", () => location.reload());
 
   // On a phone the columns of a plot are stacked.
-  function stack(layout, { height, top, domains }) {
+  function stack(layout, { height, top, domains, titles }) {
     Object.assign(layout, { height, margin: { ...layout.margin, l: 56, r: 6, t: top } });
     layout.annotations = layout.annotations.filter(({ name }) => name !== "wide");
     for (const [number, domain] of Object.entries(domains)) {
       layout[`xaxis${number}`].domain = [0, 1];
       layout[`yaxis${number}`].domain = domain;
     }
+    for (const [axis, label] of Object.entries(titles)) layout[axis].title.text = label;
   }
 
   const drawn = new Map(); // promises of the plots

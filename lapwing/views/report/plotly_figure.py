@@ -64,7 +64,7 @@ def figure(plot: Plot) -> dict[str, Any]:
 
 
 def _narrow(plot: Plot) -> dict[str, Any]:
-    """Return height and top margin [pixel] and vertical domains by axis number for a page with one column."""
+    """Return height and top margin [pixel], vertical domains by axis number and labels for a page with one column."""
     inner = plot.height * PIXELS - _top(plot) - _MARGIN["b"]
     order = sorted(range(len(plot.panels)), key=lambda i: (plot.panels[i].row, plot.panels[i].column))
     heights = {}
@@ -81,7 +81,21 @@ def _narrow(plot: Plot) -> dict[str, Any]:
         domains["" if i == 0 else str(i + 1)] = [round(min(max(end, 0.0), 1.0), 5) for end in ends]
         down += heights[i] + gaps[i]
     top = _top(plot, _NARROW)
-    return {"height": round(total + top + _MARGIN["b"]), "top": top, "domains": domains}
+    return {"height": round(total + top + _MARGIN["b"]), "top": top, "domains": domains, "titles": _shared_labels(plot)}
+
+
+def _shared_labels(plot: Plot) -> dict[str, str]:
+    """Return by axis the labels that panels share with their row or column, which a single column separates."""
+    result = {}
+    for i, panel in enumerate(plot.panels):
+        number = "" if i == 0 else str(i + 1)
+        row = [other.y_label for other in plot.panels if other.row == panel.row and other.y_label]
+        column = [o.x_label for o in plot.panels if o.column == panel.column and not o.timed and o.x_label]
+        if not panel.y_label and row:
+            result[f"yaxis{number}"] = text_of(row[0])
+        if not (panel.x_label or panel.timed) and column:
+            result[f"xaxis{number}"] = text_of(column[-1])
+    return result
 
 
 def _axes(layout: dict, plot: Plot, panel: Panel, number: str, domains: tuple, timed: list[str], bottom: bool) -> None:

@@ -1,7 +1,8 @@
 // Camera modes, and synchronisation of the time with an enclosing page, in a page of viser's client.
 (() => {
   const facts = window.lapwing;
-  const looks = { darkMode: matchMedia("(prefers-color-scheme: dark)").matches };
+  const scheme = matchMedia("(prefers-color-scheme: dark)"), looks = { darkMode: scheme.matches };
+  scheme.addEventListener("change", () => (document.documentElement.dataset.mantineColorScheme = scheme.matches ? "dark" : "light")); // the client reads it once
   Object.defineProperty(window, "__VISER_EMBED_CONFIG__", { get: () => looks, set() {} }); // overrides the configuration of a recording
 
   const { slow, smooth, simplify } = window.lapwingSoftware;

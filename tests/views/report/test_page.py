@@ -12,6 +12,8 @@ from circle_report import OFFSET, RATE, SECONDS, report, values
 
 from lapwing.flights.flight_data import FlightData
 from lapwing.views.report import flight_header, plots
+from lapwing.views.report.plot import Line, Panel, Plot
+from lapwing.views.report.plotly_figure import figure
 from lapwing.views.report.plots import motors
 
 
@@ -56,6 +58,16 @@ def test_path_is_seen_from_above_and_from_two_sides(page):
     assert values(above["x"]) == pytest.approx(values(south["x"]))
     assert values(above["y"]) == pytest.approx(values(east["x"]))
     assert values(south["y"])[-1] == pytest.approx(1.0 + 0.1 * SECONDS)
+
+
+CELLS = ((0, 0, "place", ""), (0, 1, "", ""), (1, 0, "rate", "speed"), (1, 1, "", "height"))
+
+
+def test_panels_of_a_grid_have_their_labels_in_one_column():
+    x = np.arange(3.0)
+    grid = [Panel((Line(x, x),), y, low, row=r, column=c, timed=False) for r, c, y, low in CELLS]
+    narrow = figure(Plot(tuple(grid), "", 4.0, (1.0, 1.0), (1.0, 1.0)))["narrow"]
+    assert narrow["titles"] == {"xaxis": "speed", "yaxis2": "place", "xaxis2": "height", "yaxis4": "rate"}
 
 
 def test_narrow_page_has_one_column_without_overlap(page):
