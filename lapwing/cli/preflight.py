@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import typer
 
 MANY_PARTS = 8  # of a step, from which the cause is printed
+RIGID = ("rigid_body", "multibody")  # models of a multirotor without a load, which the wind moves by itself
 
 if TYPE_CHECKING:
     from lapwing.cosim.config.run_config import RunConfig
@@ -50,7 +51,15 @@ def check_gains(scene: "Scene", force: bool) -> None:
         raise ValueError("autopilot.gains: unstable in hover; design others with lapwing tune, or use --force")
 
 
-def warn_of_round_off(scene: "Scene") -> None:
+def print_warnings(scene: "Scene", config: "RunConfig") -> None:
+    """Print a line for each part of a scene that can be flown but hardly does what its author expects."""
+    _warn_of_round_off(scene)
+    _warn_of_split_steps(scene)
+    _warn_of_wind(scene)
+    _warn_of_fence(scene, config)
+
+
+def _warn_of_round_off(scene: "Scene") -> None:
     """Print a warning for each vehicle whose substeps in contact reach round-off before its accuracy."""
     from lapwing.services.plant.schema import Solver, limited_by_round_off
 
@@ -61,7 +70,7 @@ def warn_of_round_off(scene: "Scene") -> None:
             typer.echo(f"lapwing: warning: solver.accuracy: {message}; use at least {least:g}", err=True)
 
 
-def warn_of_split_steps(scene: "Scene") -> None:
+def _warn_of_split_steps(scene: "Scene") -> None:
     """Print a warning for each vehicle whose steps are split into many parts, with the cause."""
     from lapwing.dynamics.vehicles.step_bound import FASTEST_RATE, causes
     from lapwing.services.common.schemas.vehicle_schema import Vehicle
@@ -79,7 +88,25 @@ def warn_of_split_steps(scene: "Scene") -> None:
             typer.echo(f"lapwing: warning: solver: {message} into {number:.0f}, which costs most of the time", err=True)
 
 
-def warn_of_fence(scene: "Scene", config: "RunConfig") -> None:
+def _warn_of_wind(scene: "Scene") -> None:
+    """Print a warning for each vehicle whose scene has a wind that moves nothing."""
+    from lapwing.dynamics.effects._wind_use import uses_wind
+    from lapwing.services.common.schemas.vehicle_schema import Effects, Vehicle
+    from lapwing.services.plant import models
+
+    for vehicle in scene.each_vehicle:
+        winds = [name for name in vehicle[Effects].tables if name.startswith("wind_")]
+        if not winds or vehicle[Vehicle].model not in RIGID or "shared_slung_load" in vehicle[Effects].tables:
+            continue
+        if not any(uses_wind(effect) for effect in models.get(vehicle[Vehicle].model).describe(vehicle)[1].effects):
+            prefix = f"{vehicle.lookup('vehicle.name')}: " if scene.vehicles else ""
+            message = "does not move the vehicle: no effect of the scene uses it"
+            typer.echo(
+                f"lapwing: warning: {prefix}effects.{winds[0]} {message}; add body_drag or axial_inflow", err=True
+            )
+
+
+def _warn_of_fence(scene: "Scene", config: "RunConfig") -> None:
     """Print a warning for each vehicle whose trajectory leaves the scene's fence, with the first time and place."""
     from lapwing.cosim.diagram.multi_vehicle import members
     from lapwing.services.common.plans.fence import Fence

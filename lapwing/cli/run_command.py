@@ -16,9 +16,7 @@ from lapwing.cli.output_paths import check_distinct, check_log, claim, claim_rep
 from lapwing.cli.preflight import (
     check_firmware_program,
     check_gains,
-    warn_of_fence,
-    warn_of_round_off,
-    warn_of_split_steps,
+    print_warnings,
     with_solver_selected,
 )
 from lapwing.cli.run_options import MULTI_PROCESS, SINGLE_PROCESS, RunOptions
@@ -71,8 +69,6 @@ def _prepare(options: RunOptions) -> "tuple[Scene, RunOptions, ProcessSpec]":
         if not options.external:
             check_firmware_program(scene)
         check_gains(scene, options.force)
-        warn_of_round_off(scene)
-        warn_of_split_steps(scene)
         return scene, options, _spec(options, scene)
 
 
@@ -139,7 +135,7 @@ def _spec(options: RunOptions, scene: "Scene") -> "ProcessSpec":
     from lapwing.services.scene_resolver import resolve
 
     config = resolve(scene, run_options.plan_commands(options.plan or [], scene, _print_note))
-    warn_of_fence(scene, config)
+    print_warnings(scene, config)
     if options.mavlink and (firmware := foreign_firmware(config)):
         message = f"--mavlink: {firmware} flies the vehicle and has its own MAVLink or MSP links"
         raise ValueError(f"{message}; connect the ground station to the firmware")

@@ -9,13 +9,7 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.options import Overrides
 from lapwing.cli.output_paths import check_distinct, claim
-from lapwing.cli.preflight import (
-    check_gains,
-    warn_of_fence,
-    warn_of_round_off,
-    warn_of_split_steps,
-    with_solver_selected,
-)
+from lapwing.cli.preflight import check_gains, print_warnings, with_solver_selected
 from lapwing.cosim.complete_file import write_text
 from lapwing.dynamics.config_error import ConfigError
 
@@ -86,9 +80,7 @@ def check(
         exchange, lines = loaded[Communication], [("title", loaded[Run].title or loaded.name)]
         typer.echo(f"{scene}: ok")
         check_gains(loaded, force=True)
-        warn_of_round_off(loaded)
-        warn_of_split_steps(loaded)
-        warn_of_fence(loaded, config)
+        print_warnings(loaded, config)
         for each in loaded.each_vehicle:
             vehicle = each[Vehicle]
             lines += [

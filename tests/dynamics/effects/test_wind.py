@@ -7,6 +7,7 @@ import pytest
 from scipy.signal import welch
 
 from lapwing.dynamics import effects
+from lapwing.dynamics.effects._wind_use import uses_wind
 from lapwing.dynamics.effects.random_wind_force import draw, random_wind_force, reported_wind
 from lapwing.dynamics.effects.wind_boundary_layer import wind_boundary_layer
 from lapwing.dynamics.effects.wind_constant import WindConstant, wind_constant
@@ -16,6 +17,7 @@ from lapwing.dynamics.noise import stream_key
 from lapwing.dynamics.terrain import LEVEL, relief
 from lapwing.dynamics.vehicles import multirotor
 from lapwing.kernels import kernel
+from tests.commands import run_command
 
 
 @pytest.mark.usefixtures("uncompiled")
@@ -41,6 +43,32 @@ def test_every_aerodynamic_effect_feels_motion_of_air(drone):
     assert one.angular_acceleration_body == pytest.approx(other.angular_acceleration_body, abs=1e-11)
     assert one.motor_power == pytest.approx(other.motor_power)
     assert one.acceleration_world[0] > 0.1
+
+
+ALONE = ["axial_inflow", "body_drag", "dynamic_inflow", "gravity", "ground_effect", "gyroscopic_torque", "h_force",
+         "random_wind_force", "rotor_flapping", "rotor_interference"]  # fmt: skip
+
+
+@pytest.mark.usefixtures("uncompiled")
+@pytest.mark.parametrize("name", ALONE)
+def test_effects_that_use_the_wind_are_those_whose_forces_change_with_it(drone, name):
+    accelerations = []
+    for velocity in ((0.0, 0.0, 0.0), (4.0, -2.0, 1.0)):
+        tables = {"rotor_thrust": {}, name: {}, "wind_constant": {"velocity": velocity}}
+        p = multirotor.parameters(drone, effects.from_scene(tables, drone))
+        x = multirotor.initial_state(p, position_world=(0.0, 0.0, 2.0), rotor_speed=330.0, omega_body=(0.5, -0.3, 0.2))
+        o = multirotor.observe(p, 0, 0.004, x, (32.0,) * 4)
+        accelerations.append((*o.acceleration_world, *o.angular_acceleration_body))
+    assert any(map(uses_wind, p.effects)) == (accelerations[0] != accelerations[1])
+
+
+WINDY = ("hover", "--set", "effects.wind_constant.velocity=[3, 0, 0]")
+
+
+@pytest.mark.parametrize(("more", "warns"), [((), True), (("--set", "effects.body_drag={}"), False)])
+def test_wind_that_moves_nothing_is_a_warning(more, warns):
+    text = "effects.wind_constant does not move the vehicle: no effect of the scene uses it; add body_drag"
+    assert (f"lapwing: warning: {text}" in run_command("check", *WINDY, *more, code=0).stderr) == warns
 
 
 GUST = WindGust((4.0, 0.0, -2.0), 1.0, 2.0)
