@@ -261,6 +261,7 @@ def _fly(
     import time
 
     from lapwing.cli.progress import StudyProgress
+    from lapwing.cosim.processes.interrupt import Interrupted
     from lapwing.studies.campaign.shard_loop import Count
     from lapwing.studies.campaign.shard_loop import campaign as study
     from lapwing.studies.campaign.statistics import percent
@@ -281,4 +282,11 @@ def _fly(
             text = f"{rate:.1f} runs/s, {count.failures} failures{share}"
             progress.say(text, before + finished, own_runs)
 
-        study(folder, first, workers, say, until, part)
+        try:
+            counted = study(folder, first, workers, say, until, part).runs
+        except Interrupted as interrupted:
+            kept = own_runs - sum(runs.get(k, 0) for k in folder.missing())
+            detail = f"{kept} of {own_runs} runs are kept; run the same command again to continue"
+            raise Interrupted(interrupted.signal, detail) from None
+    if until is not None and counted < own_runs:
+        screen.print(f"--ci-half-width {until:g} is reached after {counted} of {own_runs} runs")

@@ -32,7 +32,8 @@ def _lost(code: int, text: str) -> bool:
 
 
 def _interrupted(code: int, text: str) -> bool:
-    return (code, text) == (130, "lapwing: ended by SIGINT\n")
+    line = r"lapwing: ended by SIGINT(; \d+ of 40 runs are kept; run the same command again to continue)?\n"
+    return code == 130 and re.fullmatch(line, text) is not None
 
 
 KINDS: dict[str, Callable[[int, str], bool]] = {KILL: _killed, WORKER: _lost, INTERRUPT: _interrupted}

@@ -103,7 +103,7 @@ def test_choices_are_listed():
         ("run.seed=1.5", "override run.seed: expected a whole number at least 0 and below 9.22337e+18, got 1.5"),
         ("run.duration=nan", "override run.duration: expected a finite number, got nan"),
         ("run=3", "override run: expected a table [run], got 3"),
-        ("effects.gravity=3", "override effects.gravity: expected a table [effects.gravity], or false, got 3"),
+        ("effects.gravity=3", "override effects.gravity: expected a table, {} for its defaults, or false, got 3"),
         ("vehicle.name=1x", "override vehicle.name: expected a text of the form"),
         ("communication.rate=300", "override communication.rate: expected a rate with a whole number of ns"),
         (
@@ -211,7 +211,7 @@ def test_false_switches_an_effect_or_a_sensor_off():
     [
         ("effects.bodydrag=false", "effects.bodydrag: unknown effect 'bodydrag'; did you mean body_drag?"),
         ("sensors.sonr=false", "sensors.sonr: unknown sensor 'sonr'; did you mean sonar?"),
-        ("effects.gravity=true", "effects.gravity: expected a table [effects.gravity], or false, got True"),
+        ("effects.gravity=true", "effects.gravity: expected a table, {} for its defaults, or false, got True"),
     ],
 )
 def test_only_known_entries_are_switched_off(override, expected):

@@ -202,6 +202,8 @@ def test_runs_beyond_interval_width_are_kept(tmp_path):
     assert folder.finish() != digest
     assert sum(map(len, read(folder.path).pages())) == shortened.runs
     assert not folder.missing()
+    _, output = run_lapwing(*options(folder.path), "--ci-half-width", 0.2)
+    assert f"--ci-half-width 0.2 is reached after {shortened.runs} of {RUNS} runs" in output
     assert campaign(folder, first, no_workers) == whole
     assert folder.finish() == digest
 
