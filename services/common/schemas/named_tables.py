@@ -41,7 +41,7 @@ class NamedTables(SceneTable):
         """Raise ConfigError unless every entry is a table."""
         for name, table in self.tables.items():
             if not isinstance(table, dict):
-                raise ConfigError(f"{self.TABLE}.{name}", f"got {table!r}", f"a table, {{}} for its defaults, or false")
+                raise ConfigError(f"{self.TABLE}.{name}", f"got {table!r}", "a table, {} for its defaults, or false")
 
     def load(self, scene: Scene) -> None:
         """Import the user modules. Raise ConfigError if one cannot be imported."""
