@@ -286,7 +286,7 @@ def _fly(
             counted = study(folder, first, workers, say, until, part).runs
         except Interrupted as interrupted:
             kept = own_runs - sum(runs.get(k, 0) for k in folder.missing())
-            detail = f"{kept} of {own_runs} runs are kept; run the same command again to continue"
+            detail = f"{kept} of {own_runs} runs are kept; run the same command again to continue" if kept else ""
             raise Interrupted(interrupted.signal, detail) from None
     if until is not None and counted < own_runs:
         screen.print(f"--ci-half-width {until:g} is reached after {counted} of {own_runs} runs")

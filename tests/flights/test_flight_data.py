@@ -91,7 +91,7 @@ def ended(**truth):
         "pose.position": np.linspace((0.0, 0.0, 0.35), (1.0, 0.0, 2.0), 10),
         "pose.orientation": synthetic_flights.LEVEL,
         "velocity": (0.0, 0.0, 0.0),
-        "ground_contact": True,
+        "ground_contact": np.arange(10) > 5,
     }
     return synthetic_flights.flight(10, ground_truth=columns | truth, status={"finished": True, "landed": True})
 

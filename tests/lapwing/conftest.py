@@ -8,6 +8,7 @@ from typing import NamedTuple
 import pytest
 
 from lapwing.cli import entry_point as cli
+from lapwing.cosim.processes import interrupt
 
 ROOT = Path.cwd()
 
@@ -25,6 +26,7 @@ def lapwing(monkeypatch, tmp_path, capfd):
     """Return a function that calls `lapwing` in a folder with only the scenes: exit code, output, errors."""
     (tmp_path / "scenes").symlink_to(ROOT / "lapwing/scenes")
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(interrupt, "_raised", None)  # set again at the end: a signal of this test is that of no other
     handlers = {number: signal.getsignal(number) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)}
 
     def call(*arguments):
