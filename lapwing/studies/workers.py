@@ -53,7 +53,8 @@ def workers(number: int, advice: str = REPEAT) -> Iterator[ProcessPoolExecutor]:
     # spawned: a fork of a process with threads may hang, and would inherit the other end of the pipe
     context = multiprocessing.get_context("spawn")
     theirs, ours = context.Pipe(duplex=False)
-    with ours, _pool(number, context, theirs) as pool:
+    with ours:
+        pool = _pool(number, context, theirs)  # ended once: an interrupted end does not allow another
         try:
             yield pool
         except BaseException as error:
