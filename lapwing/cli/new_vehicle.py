@@ -68,7 +68,7 @@ def write_vehicle(
     name: str,
     measured: Values,
     folder: Path,
-    ask: "Ask | None" = None,
+    ask: Ask | None = None,
     unitless: Collection[str] = (),
 ) -> tuple[Path, str, list[str]]:
     """Write an airframe. Return its path, a line about its thrust over weight, and warnings.

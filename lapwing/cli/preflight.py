@@ -43,12 +43,16 @@ def check_gains(scene: "Scene", force: bool) -> None:
 
     lines = []
     for vehicle in scene.each_vehicle:
-        prefix = f"{vehicle.lookup('vehicle.name')}: " if scene.vehicles else ""
-        lines += [f"{prefix}{line}" for line in unstable_loops(vehicle)]
+        lines += [f"{_prefix(scene, vehicle)}{line}" for line in unstable_loops(vehicle)]
     for line in lines:
         typer.echo(f"lapwing: {'warning: ' if force else ''}{line}", err=True)
     if lines and not force:
         raise ValueError("autopilot.gains: unstable in hover; design others with lapwing tune, or use --force")
+
+
+def _prefix(scene: "Scene", vehicle: "Scene") -> str:
+    """Return the name of a vehicle of a fleet, for the beginning of a line; "" for one vehicle."""
+    return f"{vehicle.lookup('vehicle.name')}: " if scene.vehicles else ""
 
 
 def print_warnings(scene: "Scene", config: "RunConfig") -> None:
@@ -99,11 +103,9 @@ def _warn_of_wind(scene: "Scene") -> None:
         if not winds or vehicle[Vehicle].model not in RIGID or "shared_slung_load" in vehicle[Effects].tables:
             continue
         if not any(uses_wind(effect) for effect in models.get(vehicle[Vehicle].model).describe(vehicle)[1].effects):
-            prefix = f"{vehicle.lookup('vehicle.name')}: " if scene.vehicles else ""
-            message = "does not move the vehicle: no effect of the scene uses it"
-            typer.echo(
-                f"lapwing: warning: {prefix}effects.{winds[0]} {message}; add body_drag or axial_inflow", err=True
-            )
+            wind = f"{_prefix(scene, vehicle)}effects.{winds[0]}"
+            message = "does not move the vehicle: no effect of the scene uses it; add body_drag or axial_inflow"
+            typer.echo(f"lapwing: warning: {wind} {message}", err=True)
 
 
 def _warn_of_fence(scene: "Scene", config: "RunConfig") -> None:
@@ -120,9 +122,9 @@ def _warn_of_fence(scene: "Scene", config: "RunConfig") -> None:
         fence = Fence(vehicle[FenceTable].items())
         for time, phase, x, y, _ in service.parameters.track(member.duration):
             if breach := fence.breach(x, y):
-                prefix = f"{member.vehicle}: " if scene.vehicles else ""
-                message = f"x = {x:z.1f} m, y = {y:z.1f} m at t = {time:.1f} s in phase {phase!r} is {breach}"
-                typer.echo(f"lapwing: warning: {prefix}trajectory: {message}; move it or the fence", err=True)
+                place = f"x = {x:z.1f} m, y = {y:z.1f} m at t = {time:.1f} s in phase {phase!r}"
+                message = f"{_prefix(scene, vehicle)}trajectory: {place} is {breach}"
+                typer.echo(f"lapwing: warning: {message}; move it or the fence", err=True)
                 break
 
 

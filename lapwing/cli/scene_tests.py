@@ -34,6 +34,8 @@ def scene_tests(
 
     Exit codes: 1 a simulation failed, 2 invalid input, 4 a vehicle failed.
     """
+    from lapwing.views.terminal import counted
+
     claim(junit)
     scenes = scenes_of(folder)
     suite = ElementTree.Element("testsuite", name=folder.name or str(folder.resolve().name))
@@ -51,8 +53,7 @@ def scene_tests(
     suite.attrib |= {"tests": str(len(kinds)), "failures": str(failures), "errors": str(errors)}
     if junit:
         ElementTree.ElementTree(suite).write(junit, encoding="utf-8", xml_declaration=True)
-    plural = "" if errors == 1 else "s"
-    typer.echo(f"{len(kinds) - failures - errors} passed, {failures} failed, {errors} error{plural}")
+    typer.echo(f"{len(kinds) - failures - errors} passed, {failures} failed, {counted(errors, 'error')}")
     if errors or failures:
         raise SystemExit(1 if errors else FLIGHT_FAILED)
 

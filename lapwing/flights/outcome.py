@@ -149,7 +149,8 @@ def classify(
     if math.isfinite(accident := first_accident(truth, contacts)):
         return outcome("crashed", accident, "", failsafe)
     over = mission_finished(status) or (failsafe and status.landed[-1] and not status.armed[-1])
-    at_rest = over and not _not_resting(truth, status, cosine)
+    fault = _not_resting(truth, status, cosine) if over else ""
+    at_rest = over and not fault
     if failure and not (failure == ENDED and at_rest):
         return outcome("aborted", end, failure, failsafe)
     grounded = touches and touches[0].start == 0 and end - truth.times[min(touches[0].stop, len(truth) - 1)] < BOUNCE
@@ -166,7 +167,7 @@ def classify(
         if completion and not failsafe:
             return outcome("completed", end, completion)
         return outcome("timed out", end, _unfinished_outcome(status, failsafe), failsafe)
-    if fault := _not_resting(truth, status, cosine):
+    if fault:
         return outcome("crashed", end, fault, failsafe)
     # the last touch before the motors stopped; without contact information, the end
     time = float(truth.times[touches[-1].start]) if touches and not grounded else end

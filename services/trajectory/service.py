@@ -28,14 +28,20 @@ class TrajectoryConfig(NamedTuple):
     core: TrajectoryPath | FollowedPath
     phases: tuple[str, ...]  # names by index
 
-    def track(self, duration: float) -> Iterator[tuple[float, str, float, float, float]]:
-        """Yield time [s], phase and world x, y, z [m], until the vehicle holds or `duration` [s] is over."""
+    def track(self, duration: float, most: float = math.inf) -> Iterator[tuple[float, str, float, float, float]]:
+        """Yield time [s], phase and world x, y, z [m], until the vehicle holds or `duration` [s] is over.
+
+        Args:
+            duration: of the run [s].
+            most: largest number of intervals between the places; each takes at least `TRACK_INTERVAL`.
+        """
         core = self.core
         paths = [core.relative.path, core.leader.path] if isinstance(core, FollowedPath) else [core.path]
         own = paths[0]
         duration = min(duration, max(float(c.start[-1]) for path in paths for c in (path.x, path.y, path.yaw)))
-        for sample in range(int(duration / TRACK_INTERVAL) + 2):
-            time = min(sample * TRACK_INTERVAL, duration)
+        interval = max(TRACK_INTERVAL, duration / most)
+        for sample in range(int(duration / interval) + 2):
+            time = min(sample * interval, duration)
             x, y, z = _place(own, time)
             if isinstance(core, FollowedPath):
                 s, c = math.sincos(_channel_at(core.leader.path.yaw, time)[0]) if core.heading else (0.0, 1.0)

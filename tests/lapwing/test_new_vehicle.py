@@ -110,7 +110,7 @@ def test_answer_that_contradicts_earlier_ones_is_prompted_again(tmp_path):
     assert "payload = 0.2 " in (tmp_path / "vehicles/mine.toml").read_text()
 
 
-def test_options_that_contradict_each_other_are_rejected_before_first_question(tmp_path):
+def test_new_vehicle_rejects_contradicting_options_before_it_asks(tmp_path):
     output, code = in_a_terminal(tmp_path, more=("--set", "mass=1.5", "--set", "payload=2"))
     assert (code, output) == (2, "lapwing: --set payload: expected less than total = 1.5 kg, got 2\n")
 

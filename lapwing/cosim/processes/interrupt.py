@@ -34,7 +34,7 @@ def interrupts_first() -> Iterator[None]:
     """
     try:
         yield
-    except Exception:
+    except Exception:  # of any kind: the unfinished object decides; without an interrupt it goes on unchanged
         if _raised is None:
             raise
         raise _raised from None

@@ -1,4 +1,4 @@
-"""Which effects the wind acts through."""
+"""Effects through which the wind acts on a vehicle."""
 
 from collections.abc import Callable
 from types import CodeType

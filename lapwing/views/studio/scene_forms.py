@@ -183,9 +183,8 @@ def tracks(scene: Scene) -> list[list[tuple[float, ...]]]:
     for member in members(resolve(scene)):
         service = member.services.get(TRAJECTORY)
         if service is not None and isinstance(service.parameters, TrajectoryConfig):
-            places = [place for _, _, *place in service.parameters.track(member.duration)]
-            shown = places[:: max(1, len(places) // MOST_PLACES)] + places[-1:]
-            result.append([tuple(round(value, 2) for value in place) for place in shown])
+            places = (place for _, _, *place in service.parameters.track(member.duration, MOST_PLACES))
+            result.append([tuple(round(value, 2) for value in place) for place in places])
     return result
 
 

@@ -51,7 +51,7 @@ ALONE = ["axial_inflow", "body_drag", "dynamic_inflow", "gravity", "ground_effec
 
 @pytest.mark.usefixtures("uncompiled")
 @pytest.mark.parametrize("name", ALONE)
-def test_effects_that_use_the_wind_are_those_whose_forces_change_with_it(drone, name):
+def test_uses_wind_is_true_for_effects_whose_acceleration_changes_in_wind(drone, name):
     accelerations = []
     for velocity in ((0.0, 0.0, 0.0), (4.0, -2.0, 1.0)):
         tables = {"rotor_thrust": {}, name: {}, "wind_constant": {"velocity": velocity}}
@@ -66,7 +66,7 @@ WINDY = ("hover", "--set", "effects.wind_constant.velocity=[3, 0, 0]")
 
 
 @pytest.mark.parametrize(("more", "warns"), [((), True), (("--set", "effects.body_drag={}"), False)])
-def test_wind_that_moves_nothing_is_a_warning(more, warns):
+def test_check_warns_of_a_wind_that_no_effect_uses(more, warns):
     text = "effects.wind_constant does not move the vehicle: no effect of the scene uses it; add body_drag"
     assert (f"lapwing: warning: {text}" in run_command("check", *WINDY, *more, code=0).stderr) == warns
 
