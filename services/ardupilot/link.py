@@ -147,7 +147,7 @@ class ArduPilotLink(MavlinkLink):
             if self._process(self._socket.receive()):
                 self._take_turns("linked")
                 return
-        advice = "check that it runs" if self._program else "start arducopter with --model JSON:127.0.0.1"
+        advice = "check that it runs" if self.program else "start arducopter with --model JSON:127.0.0.1"
         self._time_out(f"no servo packet for {timeout:g} s", advice)
 
     def _handle(self, tick: int, reason: int, number: int, read: Read) -> None:

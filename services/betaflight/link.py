@@ -77,13 +77,13 @@ class BetaflightLink(ProgramLink):
         ports, turns = self._ports, None
         if self._config.command:
             self._start()
-            assert self._program is not None
-            self._complete(partial(boot.configure, self._config, self._program, self._waits))
+            assert self.program is not None
+            self._complete(partial(boot.configure, self._config, self.program, self._waits))
             turns = Turns(
                 "b", ports.state, self._config.interval_ns, (ports.msp, ports.motors), IDLE, ports.motors,
                 start_ns=BOOT, read_ns=READING,
             )  # fmt: skip
-            self._program.restart(self._prepare(turns))
+            self.program.restart(self._prepare(turns))
         self._complete(self._calibrate, turns)
 
     def _complete(self, start: Callable[[], None], turns: Turns | None = None) -> None:
@@ -93,13 +93,13 @@ class BetaflightLink(ProgramLink):
                 start()
                 return
             except boot.IncompleteStart as error:
-                if not left or not self._program:
+                if not left or not self.program:
                     raise
                 self.report.note(f"started again: {error}")
                 if self._msp:
                     self._msp.close()
-                self._program.stop()
-                self._program.restart(turns and self._prepare(turns))
+                self.program.stop()
+                self.program.restart(turns and self._prepare(turns))
                 self._sender = None
 
     def _calibrate(self) -> None:
@@ -119,8 +119,8 @@ class BetaflightLink(ProgramLink):
                 time.sleep(FEED_EVERY)
 
         self._take_turns("ready")
-        self._msp = boot.connect(self._config, self._program, self._waits)
-        self._status = boot.settle(self._config, self._msp, self._program, feed, self._waits)
+        self._msp = boot.connect(self._config, self.program, self._waits)
+        self._status = boot.settle(self._config, self._msp, self.program, feed, self._waits)
 
     def step(self, tick: int, read: Read) -> FirmwareOutput:
         """Send state and sticks at the time of the tick, and return the newest motor outputs."""

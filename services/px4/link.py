@@ -128,7 +128,7 @@ class Px4Link(MavlinkLink):
         assert self._server is not None
         timeout, where = self._config.start_timeout, "tcp {}:{}".format(*self._server.getsockname())
         if not any(self._accept() for _ in self._attempts(f"px4 on {where}", timeout)):
-            advice = "check its model" if self._program else "start px4 with PX4_SIM_MODEL=none_iris"
+            advice = "check its model" if self.program else "start px4 with PX4_SIM_MODEL=none_iris"
             self._time_out(f"no connection for {timeout:g} s", advice)
         self._take_turns("linked")
         self._answers[0] = self.in_turns
@@ -257,7 +257,7 @@ class Px4Link(MavlinkLink):
 
     def _reconnect(self) -> None:
         """Wait for the restarted firmware; the vehicle keeps its state, with its motors off."""
-        if self._program:
+        if self.program:
             self._fail("it closed its connection", "check why in its output")
         self.report.note(f"PX4 closed its connection at t = {self._time:.3f} s")
         self._shared.outputs[:], self._armed[0] = 0.0, False

@@ -15,7 +15,7 @@ import socket
 import sys
 import threading
 import time
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import Self
@@ -72,11 +72,17 @@ def claim_core(cores: Sequence[int]) -> CoreClaim:
 
 def claim_any() -> CoreClaim | None:
     """Return a claim on a core that this thread may use, None on systems other than Linux."""
-    cores = sorted(_affinity(0))
-    if not cores:
-        return None
-    first = os.getpid() % len(cores)  # claims are not visible from another container
-    return claim_core([*cores[first:], *cores[:first]])
+    cores = _allowed()
+    return claim_core(cores) if cores else None
+
+
+def cores_at_start(in_turns: bool) -> list[int]:
+    """Return the cores on which a program begins, none if the system has no affinity.
+
+    A program whose threads run in turns begins on one: on two, messages of its two sockets can change their order.
+    """
+    cores = _allowed()
+    return cores[:1] if in_turns else cores
 
 
 def less_loaded_core(core: int, own: float, loads: Mapping[int, float]) -> int | None:
@@ -137,8 +143,7 @@ class SharedCore:
     """Core of the calling thread and a program that it has started.
 
     All methods must be called by the thread that exchanges messages with the program. Create the object before the
-    program starts, with the affinity that the program inherits. An affinity that the user gives to either, before or
-    during the run, is respected.
+    program starts. An affinity that the user gives to either, before or during the run, is respected.
     """
 
     def __init__(self) -> None:
@@ -149,21 +154,22 @@ class SharedCore:
         self._claim: CoreClaim | None = None  # None: the thread was bound by others
         self._next = 0.0  # [s] of the next check
 
-    def begin(self, pid: int | None) -> None:
-        """Share a core with a program. Do nothing for None, a program that the user has started."""
-        if pid is None or len(self._initial) < 2 or _affinity(pid) != self._initial:
+    def begin(self, pid: int, started: Collection[int]) -> None:
+        """Share a core with a program that has `started` on these cores."""
+        if len(self._initial) < 2 or _affinity(pid) != set(started):
             return
         allowed = _affinity(0)
         if len(allowed) == 1:  # the executor keeps all services on this core
             (self._core,) = allowed
         elif claim := claim_any():
-            if not _bind(0, {claim.core}):
+            if not bind(0, {claim.core}):
                 claim.release()
                 return
             self._claim, self._core = claim, claim.core
         self._pid, self._next = pid, time.monotonic() + PERIOD
         self._measure()
-        self._move_program(self._initial)
+        self._started, self._in_turns = set(started), len(started) == 1
+        self._move_program(self._started)
 
     def update(self) -> None:
         """Leave the core if others use it and another core is free; bind new threads of the program.
@@ -178,14 +184,14 @@ class SharedCore:
             self._forget()
             return
         (self._core,) = present  # the owner of the claim, another vehicle of this thread, may have moved
-        if self._claim:
+        if self._claim and not self._in_turns:
             self._relocate()
-        self._move_program(self._initial, before)
+        self._move_program(self._started, before)
 
     def end(self) -> None:
         """Give the thread its affinity back."""
         if self._claim and _affinity(0) == {self._core}:
-            _bind(0, self._initial)
+            bind(0, self._initial)
         self._forget()
 
     def _relocate(self) -> None:
@@ -201,7 +207,7 @@ class SharedCore:
         if self._core not in loads:
             return
         better = less_loaded_core(self._core, (self._own - own_before) / elapsed, loads)
-        if better is None or not _bind(0, {better}):
+        if better is None or not bind(0, {better}):
             return
         assert self._claim is not None
         self._claim.release()
@@ -219,12 +225,19 @@ class SharedCore:
         for pid in process_tree(self._pid):
             for thread in _threads(pid):
                 if _affinity(thread) in known:
-                    _bind(thread, {self._core})
+                    bind(thread, {self._core})
 
     def _forget(self) -> None:
         if self._claim:
             self._claim.release()
         self._claim = self._core = None
+
+
+def _allowed() -> list[int]:
+    """Return the cores of this thread from any one on, because claims are not visible from another container."""
+    cores = sorted(_affinity(0))
+    first = os.getpid() % len(cores) if cores else 0
+    return [*cores[first:], *cores[:first]]
 
 
 def _affinity(thread: int) -> set[int]:
@@ -235,7 +248,7 @@ def _affinity(thread: int) -> set[int]:
     return set()
 
 
-def _bind(thread: int, cores: Iterable[int]) -> bool:
+def bind(thread: int, cores: Iterable[int]) -> bool:
     """Set the cores of a thread. Return False if it has ended or the system does not permit it."""
     if sys.platform == "linux":
         with suppress(OSError):

@@ -161,8 +161,8 @@ class FirmwareBlock:
             if reason == OPEN:
                 if not self._opened:
                     self.open(self._waits)
-                if self._core:  # not before, because the firmware and Lapwing's compilation use several cores
-                    self._core.begin(self._link.pid)
+                if self._core and (program := self._link.program):  # not before: compilation uses several cores
+                    self._core.begin(program.pid, program.cores)
                 return 0
             if self._core and reason == POLL:
                 self._core.update()

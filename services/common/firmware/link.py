@@ -102,7 +102,7 @@ class ProgramLink:
     _claim: Callable[[], None]  # open the ports of Lapwing for the instance; PortInUseError if one is in use
     _begin: Callable[[], None]  # start the program or wait for it, and connect
     _waits: Waits
-    _program: Program | None = None
+    program: Program | None = None  # None if Lapwing has not started it
     _time = 0.0  # [s] simulation time
     _flying = False
     _reason = ELSEWHERE  # why two flights differ, of a program without the library
@@ -131,8 +131,8 @@ class ProgramLink:
                 self._check_own_ports()
                 self._begin()
             except FirmwareError as error:
-                quote = self._program.quote() if self._program and QUOTE not in str(error) else ""
-                starts += self._program is not None
+                quote = self.program.quote() if self.program and QUOTE not in str(error) else ""
+                starts += self.program is not None
                 self.close()
                 last = not config.chooses or instance + 1 >= self.INSTANCES or starts >= STARTS
                 if last or not isinstance(error, PortInUseError):
@@ -144,9 +144,9 @@ class ProgramLink:
     def close(self) -> None:
         """End the program, then free the ports: another run may use the instance at once."""
         self._reason = self.unrepeatable
-        if self._program:
-            self._program.close()
-        self._program = None
+        if self.program:
+            self.program.close()
+        self.program = None
 
     def _check_own_ports(self) -> None:
         """Raise PortInUseError if a port that the program will open is in use."""
@@ -167,7 +167,7 @@ class ProgramLink:
         """Start the program; those of the scene take precedence over environment `variables`. See `Program`."""
         config = self._config._replace(environment={**(variables or {}), **self._config.environment})
         prepared = self._prepare(turns) if turns else None
-        self._program = Program(config, arguments, files, self.log, self.OWN_LOGS, prepared)
+        self.program = Program(config, arguments, files, self.log, self.OWN_LOGS, prepared)
 
     def _prepare(self, turns: Turns) -> Repeatable | None:
         """Return the library that makes the program repeatable, None if there is none, for a reason that is stored."""
@@ -181,7 +181,7 @@ class ProgramLink:
 
     def _take_turns(self, event: str) -> None:
         """Wait until the library reports an event; without it, the firmware does not run in turns."""
-        repeatable = self._program.repeatable if self._program else None
+        repeatable = self.program.repeatable if self.program else None
         loaded, started = self._patience(LOADED), self._patience(self._config.start_timeout)
         self.in_turns = False
         while repeatable and not self.in_turns:
@@ -196,22 +196,17 @@ class ProgramLink:
     @property
     def unrepeatable(self) -> str:
         """Reason why two flights differ, "" if they do not."""
-        repeatable = self._program.repeatable if self._program else None
+        repeatable = self.program.repeatable if self.program else None
         return repeatable.problem if repeatable else self._reason
-
-    @property
-    def pid(self) -> int | None:
-        """Process id of the program, None if Lapwing has not started it."""
-        return self._program.pid if self._program else None
 
     @property
     def output(self) -> str:
         """Name of the file beside the log of the run that has the program's output, "" without one."""
-        return self._program.output.name if self._program and self.log else ""
+        return self.program.output.name if self.program and self.log else ""
 
     def cpu(self) -> float:
         """Return the CPU time [s] of the program, 0 if Lapwing has not started it."""
-        return self._program.cpu() if self._program else 0.0
+        return self.program.cpu() if self.program else 0.0
 
     def _peer(self) -> tuple[int, int] | None:
         """Return kind and port of the firmware's end of the link, None without a connection."""
@@ -219,8 +214,8 @@ class ProgramLink:
 
     def _patience(self, timeout: float) -> Patience:
         """Return a time-out that does not pass while the firmware is stopped, also one that the user has started."""
-        if self._program:
-            return Patience(timeout, *process_tree(self._program.pid), pauses=True)
+        if self.program:
+            return Patience(timeout, *process_tree(self.program.pid), pauses=True)
         peer = self._peer()
         if peer != self._known_peer[0]:
             self._known_peer = peer, owner_of_port(*peer) if peer else None
@@ -245,15 +240,15 @@ class ProgramLink:
         return f" at t = {self._time:.3f} s" if self._flying else " at its start"
 
     def _check_program(self) -> None:
-        if self._program:
-            self._program.check(self._when, not self._flying)
-            if self._program.repeatable and self._program.repeatable.stuck:
-                self._fail(self._program.repeatable.stuck, f"set {OFF}")
+        if self.program:
+            self.program.check(self._when, not self._flying)
+            if self.program.repeatable and self.program.repeatable.stuck:
+                self._fail(self.program.repeatable.stuck, f"set {OFF}")
 
     def _time_out(self, problem: str, advice: str) -> NoReturn:
         """Raise FirmwareError, which also names the key of the time-out."""
         self._fail(problem, f"{advice}, or raise autopilot.{'step' if self._flying else 'start'}_timeout")
 
     def _fail(self, problem: str, advice: str) -> NoReturn:
-        quote = self._program.quote() if self._program else ""
+        quote = self.program.quote() if self.program else ""
         raise FirmwareError(f"{self._config.firmware}: {problem}{self._when}; {advice}{quote}")

@@ -1,6 +1,7 @@
 """Program of a firmware, started in its own process group and terminated with the group, and the claim of its ports."""
 
 import ctypes
+import functools
 import os
 import re
 import shutil
@@ -11,13 +12,13 @@ import sys
 import tempfile
 import threading
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from contextlib import suppress
 from pathlib import Path
 from typing import IO, NamedTuple
 
 from lapwing.cosim.processes.patience import process_state
-from lapwing.cosim.processes.shared_core import process_tree, total_cpu_time
+from lapwing.cosim.processes.shared_core import bind, cores_at_start, process_tree, total_cpu_time
 from lapwing.cosim.run_errors import LockStepError
 from lapwing.services.common.firmware.firmware_config import FirmwareConfig
 from lapwing.services.common.firmware.repeatable import Repeatable
@@ -125,7 +126,7 @@ class Program:
             raise FirmwareError(f"{message}; check autopilot.command and autopilot.directory") from None
 
     def _launch(self, repeatable: Repeatable | None) -> None:
-        self.repeatable = repeatable
+        self.repeatable, self.cores = repeatable, cores_at_start(in_turns=repeatable is not None)
         self._process = subprocess.Popen(
             self._command,
             cwd=self.directory,
@@ -135,7 +136,7 @@ class Program:
             stdout=subprocess.PIPE if self._shell else self._file,
             stderr=subprocess.STDOUT,
             start_new_session=True,
-            preexec_fn=_end_with_parent if sys.platform == "linux" else None,
+            preexec_fn=functools.partial(_prepare_child, self.cores) if sys.platform == "linux" else None,
         )
         if self._process.stdout:
             self._copying = threading.Thread(target=_copy, args=(self._process.stdout, self._file), daemon=True)
@@ -233,8 +234,9 @@ def _wait_until(condition: Callable[[], bool]) -> None:
         time.sleep(0.01)
 
 
-def _end_with_parent() -> None:
-    """Let the kernel end this process when its parent is killed."""
+def _prepare_child(cores: Collection[int]) -> None:
+    """Bind this process to cores, and let the kernel end it when its parent is killed."""
+    bind(0, cores)
     _PRCTL(_DEATH_SIGNAL, signal.SIGKILL)
 
 

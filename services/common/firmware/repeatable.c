@@ -5,6 +5,7 @@
  *
  *   Threads   One thread runs at a time. It passes the turn on where it blocks: at a lock, a condition, a sleep, or a
  *             message. The next one is the next ready thread in the order of creation, or with a seed a random one.
+ *             Lapwing starts the program on one core: messages of two sockets then arrive in the order of sending.
  *   Clock     All clocks show a virtual time. It moves by one step with each message of the link to the simulator,
  *             and, while there is no link, to the next deadline. With `read_ns` it also moves by this time at each
  *             reading and by each sleep, up to the time of the last message: for a firmware with a clock of its own.
@@ -566,13 +567,6 @@ __attribute__((constructor)) static void begin(void) {
     if (sscanf(text, "%*d %d %c %d %d %lu %lu %lu %lu %128s %255s", &control, &kind, &link_port, &answer_port, &step_ns,
                &start_ns, &read_ns, &seed, hex, peers) != 10) return;
     while (idle_size < 64 && sscanf(hex + 2 * idle_size, "%2hhx", &idle[idle_size]) == 1) idle_size++;
-    unsigned core;
-    cpu_set_t one;
-    CPU_ZERO(&one);
-    if (!syscall(SYS_getcpu, &core, NULL, NULL)) { /* messages of two sockets arrive in the order of sending */
-        CPU_SET(core, &one);
-        sched_setaffinity(0, sizeof one, &one);
-    }
     self = current = add_thread(&main_thread);
     self->tid = getpid();
     self->handle = pthread_self();

@@ -8,7 +8,7 @@ import threading
 import pytest
 
 from lapwing.cosim.processes import shared_core
-from lapwing.cosim.processes.shared_core import SharedCore, claim_core, less_loaded_core, process_tree
+from lapwing.cosim.processes.shared_core import SharedCore, claim_core, cores_at_start, less_loaded_core, process_tree
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="affinity of threads exists on Linux only")
 two_cores = pytest.mark.skipif(
@@ -47,7 +47,7 @@ def test_program_shares_core_with_thread_until_end(program):
 
     def share():
         core = SharedCore()
-        core.begin(program)
+        core.begin(program, allowed)
         inside = os.sched_getaffinity(0), masks(program)
         core.end()
         return inside, os.sched_getaffinity(0)
@@ -67,7 +67,7 @@ def test_thread_with_single_core_does_not_pin_program(program):
     def share():
         os.sched_setaffinity(0, {last})
         core = SharedCore()
-        core.begin(program)  # started with all cores, which is not the mask of this thread
+        core.begin(program, {last})  # its cores are others, as after `taskset -p`
         inside = os.sched_getaffinity(0)
         core.end()
         return inside, masks(program), os.sched_getaffinity(0)
@@ -82,9 +82,10 @@ def test_program_follows_thread_pinned_later(program):
     last = max(os.sched_getaffinity(0))
 
     def share():
+        allowed = os.sched_getaffinity(0)
         core = SharedCore()
         os.sched_setaffinity(0, {last})  # by the executor of a service
-        core.begin(program)
+        core.begin(program, allowed)
         core.end()
         return masks(program), os.sched_getaffinity(0)
 
@@ -94,13 +95,43 @@ def test_program_follows_thread_pinned_later(program):
 
 
 @two_cores
+@pytest.mark.parametrize("core", [min, max])
+def test_program_in_turns_shares_core_and_stays_there(core, program, monkeypatch):
+    monkeypatch.setattr(shared_core, "PERIOD", 0.0)
+    monkeypatch.setattr(shared_core, "less_loaded_core", lambda core, own, loads: min(set(loads) - {core}))
+    first = {core(os.sched_getaffinity(0))}
+    for each in process_tree(program):
+        os.sched_setaffinity(each, first)
+
+    def share():
+        core = SharedCore()
+        core.begin(program, first)
+        before = os.sched_getaffinity(0)
+        core.update()  # on two cores, messages could change their order while it moves
+        inside = before, os.sched_getaffinity(0), *masks(program)
+        core.end()
+        return inside
+
+    own, *others = in_thread(share)
+    assert len(own) == 1
+    assert others == [own, own, own]
+
+
+def test_program_in_turns_starts_on_one_of_allowed_cores():
+    allowed = os.sched_getaffinity(0)
+    assert set(cores_at_start(in_turns=False)) == allowed
+    (core,) = cores_at_start(in_turns=True)
+    assert core in allowed
+
+
+@two_cores
 def test_program_with_affinity_of_its_own_is_left_alone(program):
     allowed, first = os.sched_getaffinity(0), min(os.sched_getaffinity(0))
     os.sched_setaffinity(program, {first})
 
     def share():
         core = SharedCore()
-        core.begin(program)
+        core.begin(program, allowed)
         return os.sched_getaffinity(0)
 
     assert in_thread(share) == allowed
@@ -114,7 +145,7 @@ def test_change_from_outside_ends_sharing(program, monkeypatch):
 
     def share():
         core = SharedCore()
-        core.begin(program)
+        core.begin(program, allowed)
         os.sched_setaffinity(0, allowed)  # as `taskset -p` does
         core.update()
         core.end()
@@ -136,7 +167,7 @@ def test_pair_leaves_core_with_other_load(program, monkeypatch):
 
     def share():
         core = SharedCore()
-        core.begin(program)
+        core.begin(program, os.sched_getaffinity(0))
         core.update()
         inside = os.sched_getaffinity(0), masks(program)
         core.end()

@@ -176,7 +176,7 @@ def test_program_end_during_imu_loss_is_reported(link):
         peer.close()
 
     flight(link, script, 1)
-    link._program = Ended()
+    link.program = Ended()
     with pytest.raises(FirmwareError, match=r"the program ended \(signal 9\) at t = 0.0\d+ s"):
         fly(link, 20, 1, SAMPLES | {ports.IMU: ImuReading(valid=False)})
 

@@ -1,5 +1,6 @@
 """Library that makes a firmware repeatable: equal answers of a threaded program under load, and its limits."""
 
+import functools
 import hashlib
 import os
 import shutil
@@ -14,6 +15,7 @@ from pathlib import Path
 import pytest
 
 from lapwing.cosim.processes.patience import Patience
+from lapwing.cosim.processes.shared_core import bind, cores_at_start
 from lapwing.services.common.firmware import repeatable
 from lapwing.services.common.firmware.repeatable import Repeatable, Turns, library
 
@@ -70,6 +72,7 @@ class Simulator:
         self.process = subprocess.Popen(
             [program, kind, *map(str, (*arguments, *extra))], env=environment, start_new_session=True,
             pass_fds=(self.library.child.fileno(),) if ordered else (), stdout=subprocess.PIPE,
+            preexec_fn=functools.partial(bind, 0, cores_at_start(ordered)),
         )  # fmt: skip
         stack.callback(self.process.stdout.close)
         stack.callback(self.process.wait)
