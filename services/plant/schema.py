@@ -29,12 +29,14 @@ def contact_tolerance(accuracy: float) -> float:
 
 
 class Solver(SceneTable):
-    """Integration of the plant within a communication step."""
+    """Integration of the plant within a communication step. `accuracy` bounds the error of its state after 1 to 2 s of
+    given motor commands; `lapwing accuracy SCENE` also has the errors by the rates of sensors and autopilot.
+    """
 
     TABLE: ClassVar[str] = "solver"
     integrator: str = "rk4_renormalised"  # a module of lapwing/dynamics/integrators
     step: float = Field(default=0.001, ge=1e-9)  # [s], divides the communication step
-    accuracy: float | None = Field(default=None, ge=1e-12)  # maximum error relative to 1 + size; selects the solver
+    accuracy: float | None = Field(default=None, ge=1e-12)  # largest error relative to 1 + size; selects both others
 
     @field_validator("integrator")
     @classmethod

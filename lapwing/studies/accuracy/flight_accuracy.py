@@ -97,9 +97,7 @@ def measure(scene: Scene, progress: Progress, step_selected: bool = False) -> Fl
         raise SceneError("solver.accuracy", MISSING, source=KeyOrigin(scene.path))
     config = resolve(scene)
     if firmware := foreign_firmware(config):
-        raise ValueError(
-            f"{scene.path}: runs of {firmware} are not repeatable; record one with lapwing run, and check its log"
-        )
+        raise ValueError(f"{scene.path}: {firmware} flies it; record a flight with lapwing run, and check its log")
     step, overrides = _finer(scene, solver.accuracy)
     finer = resolve(load(scene.path, [*scene.overrides, *overrides]))
     name = f"{solver.integrator}, step {1e3 * FINER * step:g} ms"

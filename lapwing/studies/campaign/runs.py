@@ -223,7 +223,7 @@ def _check(plan: Plan, reference: Reference) -> None:
         if (result := versions().get(name)) != expected:
             raise ValueError(f"{worker}: has {name} {result}; expected {expected} as at the start of the campaign")
     if foreign_firmware(config_of(plan, reference.run)):
-        return  # its flights are not repeatable
+        return  # one that the user has started is not repeatable
     if reference.end_state not in _verified_end_states:
         if (result := joint_end_state(fly_each(config_of(plan, reference.run), TOPICS))) != reference.end_state:
             raise ValueError(

@@ -154,7 +154,7 @@ def test_check_of_firmware_scene_names_log(tmp_path):
     options = ("--set", "solver.accuracy=1e-4", "--set", "solver.step=0.001")
     result = lapwing_check(tmp_path, "betaflight_quad", *options)
     assert result.returncode == 2
-    assert "runs of betaflight are not repeatable; record one with lapwing run, and check its log" in result.stderr
+    assert "betaflight flies it; record a flight with lapwing run, and check its log" in result.stderr
 
 
 def lapwing_check(folder, scene, *options):
