@@ -1,6 +1,5 @@
 """Studies: performance, effects, accuracy, stability, tune."""
 
-import sys
 from collections.abc import Callable
 from itertools import count
 from pathlib import Path
@@ -140,14 +139,15 @@ def accuracy(
     """
     from lapwing.cli.progress import step_progress
     from lapwing.views.studies import accuracy_command
+    from lapwing.views.terminal import console
 
-    console = accuracy_command.console()
+    screen = console(piped=120)
 
     def find() -> accuracy_command.Study:
-        with step_progress(console, "parts", 1, announced=True) as progress:
+        with step_progress(screen, "parts", 1, announced=True) as progress:
             return accuracy_command.study(target, set_ or [], goal, progress)
 
-    _study("TARGET", Path(target), json, plot, console, find, accuracy_command)
+    _study("TARGET", Path(target), json, plot, screen, find, accuracy_command)
 
 
 @app.command()
@@ -167,7 +167,8 @@ def stability(
     Exit codes: 1 a case misses its bound, 2 invalid input.
     """
     from lapwing.cli.progress import StudyProgress
-    from lapwing.studies.stability.case_runner import measure, select
+    from lapwing.cosim.processes.interrupt import Interrupted
+    from lapwing.studies.stability.case_runner import Result, measure, select
     from lapwing.views.studies import stability_result
     from lapwing.views.studies.study_result import show, write_json, write_report
     from lapwing.views.terminal import console
@@ -175,10 +176,17 @@ def stability(
     check_distinct({"--json": json, "--report": report})
     claim(json)
     claim_named("--report", report, ".html")
-    screen, names, done = console(None if sys.stdout.isatty() else 180), select(case, slow, sweep), count(1)
+    screen, names, results = console(piped=180), select(case, slow, sweep), list[Result]()
     with StudyProgress(screen, "cases") as progress:
-        results = measure(names, sweep, lambda name: progress.say(name, next(done), len(names)))
-    page = stability_result.result(results)
+        try:
+            for result in measure(names, sweep):
+                results.append(result)
+                progress.say(result.case, len(results), len(names))
+        except Interrupted as interrupted:
+            finished = f"{len(results)} of {len(names)} cases finished: {', '.join(each.case for each in results)}"
+            detail = f"{finished}; {stability_result.result(results).verdict}" if results else ""
+            raise Interrupted(interrupted.signal, detail) from None
+    page = stability_result.result(sorted(results, key=lambda each: names.index(each.case)))
     show(screen, page)
     if json:
         write_json(json, page)

@@ -1,5 +1,7 @@
 """Console and tables for results."""
 
+import os
+import sys
 from typing import Any
 
 from rich.box import SIMPLE
@@ -9,12 +11,13 @@ from rich.table import Table
 COMPACT: dict[str, Any] = {"box": SIMPLE, "pad_edge": False, "collapse_padding": True}  # for tables of up to 80 columns
 
 
-def console(width: int | None = None) -> Console:
+def console(piped: int = 80) -> Console:
     """Return a console without rich's markup, which would read "[min]" as a style.
 
     Args:
-        width: width in characters; None: that of the terminal, or 80.
+        piped: width in characters where the output is no terminal, unless the user sets COLUMNS.
     """
+    width = None if sys.stdout.isatty() or "COLUMNS" in os.environ else piped
     return Console(width=width, markup=False, highlight=False)
 
 

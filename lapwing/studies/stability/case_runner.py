@@ -2,7 +2,7 @@
 
 import os
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import as_completed
 from typing import NamedTuple
 
@@ -43,21 +43,20 @@ def select(case: str | None, long: bool, sweep: bool) -> list[str]:
     return [cases.get(case).__name__.rpartition(".")[2]]
 
 
-def measure(names: Sequence[str], sweep: bool, progress: Callable[[str], None]) -> list[Result]:
-    """Return the results of these cases, in order.
+def measure(names: Sequence[str], sweep: bool) -> Iterator[Result]:
+    """Yield the result of each of these cases when it is finished.
 
     Args:
         names: names of cases.
         sweep: also run the sweep of the difficulty.
-        progress: called with the name of each finished case.
     """
     number = min(len(names), os.cpu_count() or 1)
     if number == 1:
-        return [_report(run_case(name, sweep), progress) for name in names]
+        yield from (run_case(name, sweep) for name in names)
+        return
     with workers(number) as pool:
-        jobs = {pool.submit(run_case, name, sweep): name for name in names}
-        done = {jobs[job]: _report(job.result(), progress) for job in as_completed(jobs)}
-    return [done[name] for name in names]
+        for job in as_completed([pool.submit(run_case, name, sweep) for name in names]):
+            yield job.result()
 
 
 def run_case(name: str, sweep: bool) -> Result:
@@ -72,8 +71,3 @@ def run_case(name: str, sweep: bool) -> Result:
     with np.errstate(all="ignore"):
         sweep_result = module.sweep() if sweep else None
     return Result(name, module.HARD, result, sweep_result, time.perf_counter() - started)
-
-
-def _report(result: Result, progress: Callable[[str], None]) -> Result:
-    progress(result.case)
-    return result

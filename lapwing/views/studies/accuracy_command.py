@@ -1,6 +1,5 @@
 """`lapwing accuracy`: study of a target, with printed, written and plotted results."""
 
-import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import NamedTuple
@@ -26,11 +25,9 @@ from lapwing.studies.accuracy.work_precision import (
 )
 from lapwing.studies.effects.cost import costs
 from lapwing.studies.effects.variants import tables_of
-from lapwing.views import terminal
 from lapwing.views.studies import accuracy_plot
 from lapwing.views.terminal import table
 
-WIDTH = 120  # characters of a table without a terminal
 GOAL = 1e-6  # error of the first line without another one
 STRICTER = 0.1  # ratio of the smaller error whose cost the first line has
 
@@ -47,11 +44,6 @@ class Study(NamedTuple):
     largest: ErrorSource | None  # the largest of them with the scene's communication
     rounding: RoundOff | None  # None for a problem without steps in extended precision
     cost: tuple[float, float] | None  # [ns] of a plant step of a scene with contact: hovering, on the ground
-
-
-def console() -> Console:
-    """Return the console, of fixed width if the output is redirected."""
-    return terminal.console(None if sys.stdout.isatty() else WIDTH)
 
 
 def study(

@@ -152,7 +152,7 @@ def test_command_prints_cheapest_method(capsys, tmp_path, monkeypatch):
     said = []
     result = accuracy_command.study("os4_experiment_1", [], 1e-3, lambda *parts: said.append(parts))
     assert [(done, total) for _, done, total in said] == [(k, len(few) + 2) for k in (0, *range(len(few) + 2))]
-    accuracy_command.show(accuracy_command.console(), result)
+    accuracy_command.show(console(120), result)
     accuracy_command.write_json(tmp_path / "a.json", result)
     printed = capsys.readouterr().out
     assert "OS4 quadrotor: experiment 1" in printed
@@ -172,7 +172,7 @@ def test_scene_with_contact_has_error_sources_and_cost(capsys, monkeypatch):
 
     monkeypatch.setattr(accuracy_command.scenes, "problem", two_methods)
     result = accuracy_command.study("hover", ["run.duration=0.2"], 1e-3)
-    accuracy_command.show(accuracy_command.console(), result)
+    accuracy_command.show(console(120), result)
     assert result.selected.error <= 1e-3
     assert min(result.cost) > 0.0
     assert {part.source for part in result.parts} == set(SOURCES)

@@ -3,13 +3,15 @@
 import json
 import math
 import re
+import signal
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from lapwing.cli.study_commands import stability
-from lapwing.studies.stability import cases
+from lapwing.cosim.processes.interrupt import Interrupted
+from lapwing.studies.stability import case_runner, cases
 from lapwing.studies.stability.case_result import CaseResult, Curve, Plot, Row, Sweep
 from lapwing.studies.stability.case_runner import run_case, select
 from lapwing.views.studies.stability_result import distance
@@ -82,6 +84,19 @@ def test_case_that_ends_in_error_fails(monkeypatch):
     result = run_case("broken", False)
     assert not result.is_conclusive
     assert "out of reach" in result.figures.rows[0].invariant
+
+
+def test_interrupt_names_finished_cases(fake_case, monkeypatch):
+    fake_case(row(0.5, 2.0))
+    finished = run_case("fake", False)
+
+    def measure(names, sweep):
+        yield finished
+        raise Interrupted(signal.SIGINT)
+
+    monkeypatch.setattr(case_runner, "measure", measure)
+    with pytest.raises(Interrupted, match="SIGINT; 1 of 1 cases finished: fake; all cases hold their bounds"):
+        stability("fake")
 
 
 @pytest.mark.parametrize(
