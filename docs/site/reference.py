@@ -89,7 +89,9 @@ def _sections(schema: dict[str, Any], table: dict[str, Any], path: str, level: i
         if not inner[name]
     ]
     if rows:
-        lines = [["key", "type", "range", "default", "meaning"], ["---"] * 5, *rows]
+        heads = "key", "type", "range", "default", "meaning"
+        used = [(head, cells) for head, *cells in zip(heads, *rows, strict=True) if any(cells)]
+        lines = [*zip(*([head, "---", *cells] for head, cells in used), strict=True)]
         yield "\n".join(f"| {' | '.join(map(_cell, row))} |" for row in lines)
     for name, sub in inner.items():
         if sub:
@@ -140,7 +142,7 @@ def _type(schema: dict[str, Any], node: dict[str, Any]) -> str:
     kind = node.get("type", "any")
     if kind == "object":
         return "table" if node.get("properties") or node.get("additionalProperties", True) else "no keys"
-    return " or ".join(kind) if isinstance(kind, list) else kind
+    return " or ".join(kind).replace("object", "table") if isinstance(kind, list) else kind
 
 
 def _range(node: dict[str, Any]) -> str:
