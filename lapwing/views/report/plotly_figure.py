@@ -106,7 +106,9 @@ def _axes(layout: dict, plot: Plot, panel: Panel, number: str, domains: tuple, t
         y["automargin"] = True  # numbers with many digits would overlap the label
     x["title"] = {"text": text_of(panel.x_label), "standoff": 4}
     if panel.log_x:
-        x |= {"type": "log", "dtick": 1}
+        values = [value for mark in panel.marks if isinstance(mark, Line) for value in mark.x if value > 0.0]
+        wide = not values or max(values) > 30.0 * min(values)
+        x |= {"type": "log", "dtick": 1 if wide else "D2"}  # D2: numbers also at 2 and 5
     if panel.log_y:
         y |= {"type": "log", "exponentformat": "power"}
     if panel.y_range:
