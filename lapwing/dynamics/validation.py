@@ -121,8 +121,17 @@ def fault(error: ValidationError, model: type) -> ConfigError:
     if kind == "value_error":
         cause = context["error"]
         return cause.with_prefix(key) if isinstance(cause, ConfigError) else ConfigError(key, str(cause))
-    unit = _unit(model, location) if kind in OF_NUMBERS else ""
-    return ConfigError(key, f"got {_short(value)}", _expectation(kind, first["msg"], context, hint) + unit)
+    expectation = _expectation(kind, first["msg"], context, hint)
+    if kind == "tuple_type" and isinstance(value, dict) and describe(hint) == "a list of tables":
+        expectation = f"a list of tables, each below double brackets: [[...{location[-1]}]]"
+    if kind in OF_NUMBERS and (unit := _unit(model, location)):
+        accepted = units.UNITS.get(unit.strip(" []"), {})
+        expectation += unit
+        if isinstance(value, str) and accepted:
+            expectation += f", or a text in {', '.join(accepted)}"
+        elif "rad" in unit and isinstance(location[-1], str):
+            expectation += f", or {location[-1]}_deg"
+    return ConfigError(key, f"got {_short(value)}", expectation)
 
 
 def _unit(model: type, location: Sequence[str | int]) -> str:

@@ -31,6 +31,10 @@ BAD = {
     "list": ([HOVER, "--set", 'success.require="time"'], "--set success.require: expected a list, got 'time'"),
     "success": ([HOVER, "--set", 'success.require=["tim < 3"]'], "unknown metric 'tim'; did you mean time?"),
     "no condition": ([HOVER, "--set", 'success.require=["rmse.z"]'], "'rmse.z' is a number, not true or false"),
+    "text without quotes": (
+        [HOVER, "--set", 'success.require=["outcome == landed"]'],
+        "'landed' is a text without quotes",
+    ),
     "unlike types": ([HOVER, "--set", "success.require=[\"'a' < 1\"]"], "is a text, '1' is a number"),
     "zero divisor": ([HOVER, "--set", 'success.require=["1/0 > 1"]'], "cannot be computed: division by zero"),
     "no expression": ([HOVER, "--set", 'success.require=["exit()"]'], "expected an expression over metrics of the"),

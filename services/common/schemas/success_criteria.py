@@ -212,5 +212,7 @@ def _check_comparison(left: ast.expr, op: ast.cmpop, other: ast.expr) -> None:
             raise ValueError(f"{ast.unparse(other)!r} is {_kind(other)}, not a list")
     for member in members:
         kinds = _kind(left), _kind(member)
+        if kinds == (TEXT, NUMBER) and isinstance(member, ast.Name):
+            raise ValueError(f"{member.id!r} is a text without quotes")
         if kinds[0] != kinds[1]:
             raise ValueError(f"{ast.unparse(left)!r} is {kinds[0]}, {ast.unparse(member)!r} is {kinds[1]}")

@@ -33,7 +33,9 @@ STEEPEST_START = 46.0  # [deg] initial tilt; terrain is at most 45 degrees steep
 
 
 class Vehicle(SceneTable):
-    """The vehicle."""
+    """The vehicle. For several, write [[vehicle]] for each one: the other tables of the scene are those of all, and one
+    below it, such as [vehicle.autopilot], replaces keys of it for this vehicle.
+    """
 
     TABLE: ClassVar[str] = "vehicle"
     DISTINCT: ClassVar[str] = "name"

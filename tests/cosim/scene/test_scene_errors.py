@@ -124,7 +124,10 @@ def test_choices_are_listed():
         ("airframe.mass.payload=11", "override airframe.mass.payload: expected less than total = 10.0224 kg, got 11"),
         ("airframe.mass.totl=1", "override airframe.mass.totl: unknown key 'totl'; did you mean total?"),
         ("gains.altitude=[1, 2]", "override gains.altitude.2: missing; expected a number"),
-        ("gains.tilt_limit=1.5", "override gains.tilt_limit: expected a number above 0 and below 1.4 [rad], got 1.5"),
+        (
+            "gains.tilt_limit=1.5",
+            "override gains.tilt_limit: expected a number above 0 and below 1.4 [rad], or tilt_limit_deg, got 1.5",
+        ),
         ("autopilot.parameters=none.params", "override autopilot.parameters: lapwing/scenes/none.params: no such file"),
         ("autopilot.parameters.MPC_TKO_SPEED=9", "MPC_TKO_SPEED: expected a number from 0.1 to 5, got 9"),
         ("autopilot.estimator=kalman", 'override autopilot.estimator: "kalman" needs [sensors.imu], [sensors.magneto'),
