@@ -1,8 +1,9 @@
 """Write the reference pages of commands, Python, topics and files: python docs/site/reference.py."""
 
 import json
+import math
 import runpy
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from typer.cli import get_docs_for_click
 from lapwing.cli.app import FIRST, GROUPS
 from lapwing.cli.main import app
 from lapwing.file_schemas.annotations import dereference
-from lapwing.file_schemas.json_schema import SCHEMAS, airframe_schema, gains_schema, scene_schema
+from lapwing.file_schemas.json_schema import SCHEMAS, airframe_schema, gains_schema, scene_schema, sensor_tables
 from lapwing.messages.topics import TOPICS, custom_sensor
 from lapwing.messages.types import DEFINITIONS
 
@@ -79,12 +80,21 @@ def _example(name: str) -> str:
     return f"\n  `{FIRST[name]}`" if name in FIRST else ""
 
 
-def _sections(schema: dict[str, Any], table: dict[str, Any], path: str, level: int) -> Iterator[str]:
-    """Yield the keys of a table, and a section for each table within it."""
+def _sections(
+    schema: dict[str, Any], table: dict[str, Any], path: str, level: int, presets: Mapping[str, Any] | None = None
+) -> Iterator[str]:
+    """Yield the keys of a table, and a section for each table within it; `presets` are its values by preset."""
+    presets = presets or {}
     properties, required = table.get("properties", {}), table.get("required", [])
     inner = {name: _table_of(schema, node) for name, node in properties.items()}
     rows = [
-        [f"`{name}`", _type(schema, node), _range(node), _default(node, name in required), node.get("description", "")]
+        [
+            f"`{name}`",
+            _type(schema, node),
+            _range(node),
+            _preset_values(presets, name) or _default(node, name in required),
+            node.get("description", ""),
+        ]
         for name, node in properties.items()
         if not inner[name]
     ]
@@ -99,7 +109,9 @@ def _sections(schema: dict[str, Any], table: dict[str, Any], path: str, level: i
             heading = f"[[{where}]]" if properties[name].get("type") == "array" else f"[{where}]"
             yield f"{'#' * min(level, 5)} {heading}"
             yield dereference(schema, properties[name]).get("description", "") or sub.get("description", "")
-            yield from _sections(schema, sub, where, level + 1)
+            module = sensor_tables()[name][0] if path == "sensors" else None
+            values = {preset: getattr(p, name, None) for preset, p in presets.items()}
+            yield from _sections(schema, sub, where, level + 1, module.PRESETS if module else values)
 
 
 def _commands() -> Iterator[str]:
@@ -155,6 +167,19 @@ def _default(node: dict[str, Any], required: bool) -> str:
         return "required" if required else ""
     text = json.dumps(node["default"])
     return f"`{text}`" if len(text) <= LONGEST_DEFAULT else f"`{text[: LONGEST_DEFAULT - 4]} ...`"
+
+
+def _preset_values(presets: Mapping[str, Any], name: str) -> str:
+    """Return the values of a key, each with its presets; "" if no preset has it."""
+    names: dict[str, list[str]] = {}
+    for preset, parameters in presets.items():
+        if hasattr(parameters, name):
+            value = getattr(parameters, name)
+            text = f"{value:.4g}" if isinstance(value, float) else json.dumps(value)
+            names.setdefault("" if value in (None, math.inf) else f"`{text}`", []).append(preset)
+    if len(names) == 1:
+        return next(iter(names))
+    return "<br>".join(f"{', '.join(presets)}: {value or 'none'}" for value, presets in names.items())
 
 
 def _cell(text: str) -> str:

@@ -77,7 +77,7 @@ def _is_taken(name: str, file: Path) -> bool:
 def installed_module(name: str) -> ModuleSpec | None:
     """Return the module of that name on `sys.path`, except in the folders that this module has written."""
     if "." not in name:
-        return PathFinder.find_spec(name, [path for path in sys.path if path not in _module_folders])
+        return PathFinder.find_spec(name, [path for path in sys.path if not _is_written(path)])
     with suppress(ImportError, ValueError):
         return importlib.util.find_spec(name)
     return None
@@ -100,7 +100,11 @@ def _imports(file: Path) -> list[str]:
 
 
 FAULTS = (Exception, SystemExit)  # errors of user code that end a run with one line
-_module_folders: set[str] = set()  # folders on `sys.path` with the modules of run configurations
+_PREFIX = "run-modules-"  # of the folders with modules of run configurations; spawned workers inherit `sys.path`
+
+
+def _is_written(folder: str) -> bool:
+    return Path(folder).name.startswith(_PREFIX)
 
 
 def load(name: str, texts: Mapping[str, str]) -> ModuleType:
@@ -127,12 +131,7 @@ def install(texts: Mapping[str, str]) -> None:
         forget_sources()
     if any(n not in sys.modules for n in plain):
         folder = _write_modules(plain)
-        if folder not in sys.path:
-            sys.path.append(folder)
-        _module_folders.add(folder)
-        for other in _module_folders - {folder}:
-            if other in sys.path:
-                sys.path.remove(other)
+        sys.path[:] = [*(path for path in sys.path if not _is_written(path)), folder]
         importlib.invalidate_caches()
 
 
@@ -147,16 +146,16 @@ def source(module: ModuleType) -> str | None:
 def _write_modules(texts: Mapping[str, str]) -> str:
     """Write these modules into a folder of the cache, or of this process if other users can write there."""
     digest = hashlib.blake2b("\0".join(f"{n}\0{texts[n]}" for n in sorted(texts)).encode(), digest_size=16).hexdigest()
-    cache_root = cache_folder()
+    cache_root, name = cache_folder(), f"{_PREFIX}{digest}"
     if cache_root is not None:
-        folder = cache_root / "modules" / digest
+        folder = cache_root / "modules" / name
         with suppress(OSError):
             for path in (cache_root, folder.parent, folder):
                 path.mkdir(mode=0o700, parents=True, exist_ok=True)  # its files are executed
             if all(map(only_user_writable, (cache_root, folder.parent, folder))):
                 _write(folder, texts)
                 return str(folder)
-    folder = _folder_of_this_process() / digest
+    folder = _folder_of_this_process() / name
     folder.mkdir(exist_ok=True)
     _write(folder, texts)
     return str(folder)

@@ -378,3 +378,11 @@ def test_printed_table_fits_80_columns(tmp_path):
     assert "published" in heading
     assert "\u2026" not in shown.stdout
     assert max(map(len, heading.splitlines())) <= 80
+
+
+def test_workers_fly_module_of_the_scene_folder(tmp_path):
+    assert run_command("new", "controller", "my_control", folder=tmp_path).returncode == 0
+    own = ("--set", "autopilot.controller=my_control:MyControl", "--set", "run.duration=0.5")
+    done = run_command("campaign", "hover", "--runs", "4", "--workers", "2", *own, folder=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "4 of 4 flights" in done.stdout
