@@ -33,6 +33,16 @@ recorded at the rate of the scene key, or at every tick. In logs the vehicle's n
 definition of a message states frames and units. World is east, north, up; body is forward, left, up
 ([Frames and units](frames.md)). A field without a frame is in that of `header.frame_id`: `world`, or the vehicle's name
 for its body. Quaternions are x, y, z, w, from body to world."""
+EXIT_CODES = """## Exit codes
+
+| code | meaning |
+|---|---|
+| 0 | done; also a campaign with failed flights, or a model that `validate` calls bad: the first line has the verdict |
+| 1 | not completed: a process or user code failed, a host left, no memory; or a bound is missed: `check --accuracy`, `stability`, `tune --out` |
+| 2 | invalid input, or an output that cannot be written (full disk) |
+| 3 | the digests, final states or logs differ: `verify`, `resimulate`, `run --campaign` |
+| 4 | the vehicle flew, but does not meet `success.require` of the scene: `run`, `test` |
+| 130, 143 | ended by Ctrl-C (SIGINT), by SIGTERM |"""
 LONGEST_DEFAULT = 60  # characters
 
 
@@ -124,6 +134,7 @@ def _commands() -> Iterator[str]:
         yield f"**{heading}**"
         lines = {name: (command.commands[name].help or "").partition("\n")[0] for name in names}  # type: ignore[attr-defined]
         yield "\n".join(f"- [`{name}`](#lapwing-{name}): {line}" + _example(name) for name, line in lines.items())
+    yield EXIT_CODES
     yield (separator + rest).strip()
 
 
@@ -175,7 +186,7 @@ def _preset_values(presets: Mapping[str, Any], name: str) -> str:
     for preset, parameters in presets.items():
         if hasattr(parameters, name):
             value = getattr(parameters, name)
-            text = f"{value:.4g}" if isinstance(value, float) else json.dumps(value)
+            text = f"{value:.6g}" if isinstance(value, float) else json.dumps(value)
             names.setdefault("" if value in (None, math.inf) else f"`{text}`", []).append(preset)
     if len(names) == 1:
         return next(iter(names))

@@ -9,7 +9,7 @@ from lapwing.dynamics import effects
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.file_schemas.key_docs import Key, description, first_sentence, keys
 
-CITATION = re.compile(r" \(theory[^)]*\)")
+CITATION = re.compile(r" \(theory(?:[^()]|\([^)]*\))*\)")
 EFFECTS = {"ground_contact": "Contact of feet and hull with the ground: stiffness, damping, and friction that sticks"}
 PRESETS = {  # by sensor; the comments above the presets have the data sheets, and what was chosen
     "airspeed": {"sdp33": "Sensirion SDP33, to 1500 Pa", "ms4525do": "TE MS4525DO, to 1 psi"},

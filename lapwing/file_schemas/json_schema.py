@@ -198,6 +198,7 @@ def _sensor(name: str, module: Any, cls: type) -> Schema:
     about = "; ".join(f"{preset}: {text}" for preset, text in descriptions.presets(name, module).items())
     preset = {"description": about, "enum": list(module.PRESETS), "default": next(iter(module.PRESETS))}
     table = table_schema(cls, leave_out=["faults"])
+    _remove_defaults(table, list(module.PRESETS.values()))
     properties = {"preset": preset, **table["properties"]}
     if hasattr(module, "CHANNELS"):
         fault = table_schema(FaultTable)
@@ -205,6 +206,16 @@ def _sensor(name: str, module: Any, cls: type) -> Schema:
         text = "faults by schedule"
         properties["faults"] = {"type": "array", "items": fault, "maxItems": SLOTS, "description": text}
     return {"description": descriptions.sensor(module), **closed_table(properties)}
+
+
+def _remove_defaults(table: Schema, presets: list[Any]) -> None:
+    """Remove the defaults of keys that depend on the preset."""
+    for key, node in table["properties"].items():
+        values = [getattr(preset, key, None) for preset in presets]
+        if "properties" in node:
+            _remove_defaults(node, values)
+        elif any(value != values[0] for value in values):
+            node.pop("default", None)
 
 
 def _parameters() -> Schema:
