@@ -13,7 +13,7 @@ import typer
 from lapwing.cli.output_paths import release_claims
 
 USER_ERROR = 2
-DIFFERENT = 3  # two logs, or a log and its digest, differ
+DIFFERENT = 3  # two logs, or a digest or final state and its record, differ
 FLIGHT_FAILED = 4  # a criterion of the scene's `success.require` is not met
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from lapwing.cli.app import app
-from lapwing.cli.error_exit import fail
+from lapwing.cli.error_exit import DIFFERENT, fail
 from lapwing.cli.options import KeyPrefix, LinkOptions, LogFile, Speed, parse_speed, with_options
 from lapwing.cli.output_paths import check_log
 from lapwing.cli.run_options import check_published
@@ -172,7 +172,7 @@ def resimulate(
 ) -> None:
     """Repeat a recorded run from its log and compare digests.
 
-    Exit codes: 1 the digests differ, 2 invalid input.
+    Exit codes: 1 the run failed, 2 invalid input, 3 the digests differ.
     """
     from lapwing.cli.progress import RunProgress
     from lapwing.runs import resimulate as runs
@@ -183,7 +183,7 @@ def resimulate(
         with RunProgress(console(), 0.0) as display:
             recorded, computed = runs.resimulate(log, display, allow_code)
         if recorded != computed:
-            fail(f"{log}: digests differ: recorded {recorded}, resimulated {computed}", 1)
+            fail(f"{log}: digests differ: recorded {recorded}, resimulated {computed}", DIFFERENT)
         typer.echo(f"{log}: resimulated, digest {computed} is identical")
 
 

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from lapwing.api.flight import Flight
-from lapwing.cli.error_exit import FLIGHT_FAILED, fail
+from lapwing.cli.error_exit import DIFFERENT, FLIGHT_FAILED, fail
 from lapwing.cli.run_options import RunOptions
 from lapwing.cosim.scene import Scene
 from lapwing.flights.flight_data import SHOWN
@@ -179,7 +179,7 @@ def compare_with_campaign(options: RunOptions, flights: Sequence[Flight]) -> Non
     elif options.set_:
         typer.echo(f"{name}: final state differs, with --set")
     else:
-        fail(f"{name}: final state differs", FLIGHT_FAILED)
+        fail(f"{name}: final state differs", DIFFERENT)
 
 
 def check_success(scene: Scene, flights: Sequence[Flight]) -> None:
