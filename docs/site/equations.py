@@ -29,6 +29,6 @@ def _mathml(match: re.Match[str]) -> str:
     equation = convert(_TAG.sub("", latex), display="block" if opening == "[" else "inline")
     if _UNKNOWN.search(re.sub(r"<[^>]*>", "", equation)):
         raise ValueError(f"the converter does not know a command of this equation: {latex}")
-    right = f'<span style="float:right">({number[1]})</span>' if number else ""
-    style = ' style="margin:1em 0;overflow:auto"' if tag == "div" else ""
-    return f"<{tag}{style}>{right}{equation}</{tag}>"
+    if tag == "span":
+        return f"<span>{equation}</span>"
+    return f'<div class="equation"><div>{equation}</div>{f"<span>({number[1]})</span>" if number else ""}</div>'

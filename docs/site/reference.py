@@ -38,7 +38,7 @@ EXIT_CODES = """## Exit codes
 | code | meaning |
 |---|---|
 | 0 | done; also a campaign with failed flights, or a model that `validate` calls bad: the first line has the verdict |
-| 1 | not completed: a process or user code failed, a host left, no memory; or a bound is missed: `check --accuracy`, `stability`, `tune --out` |
+| 1 | a process or user code failed, a host left, no memory; a missed bound: `check --accuracy`, `stability`, `tune` |
 | 2 | invalid input, or an output that cannot be written (full disk) |
 | 3 | the digests, final states or logs differ: `verify`, `resimulate`, `run --campaign` |
 | 4 | the vehicle flew, but does not meet `success.require` of the scene: `run`, `test` |
@@ -190,7 +190,7 @@ def _preset_values(presets: Mapping[str, Any], name: str) -> str:
             names.setdefault("" if value in (None, math.inf) else f"`{text}`", []).append(preset)
     if len(names) == 1:
         return next(iter(names))
-    return "<br>".join(f"{', '.join(presets)}: {value or 'none'}" for value, presets in names.items())
+    return "<br>".join(f"{value or 'none'} {', '.join(presets)}" for value, presets in names.items())
 
 
 def _cell(text: str) -> str:
