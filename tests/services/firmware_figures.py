@@ -1,4 +1,4 @@
-"""Figures of flights with real firmwares, for docs/guides/autopilots.md.
+"""Figures of flights with real firmwares, for docs/appendix/firmware_flights.md.
 
 PX4=PATH python -m tests.services.firmware_figures px4 --starts 20
 ARDUCOPTER=PATH python -m tests.services.firmware_figures ardupilot --starts 20
