@@ -111,9 +111,9 @@ def log_packets(axes: Axes, config: RunConfig) -> None:
     for name, service in config.services.items():
         box, others = SERVICES[name], [port.name for port in service.ports if port.name not in read]
         if others:
-            text = f"other outputs: {', '.join(others)}"
+            text = "\n".join(["other outputs:", *others])
             axes.text(
-                0.5 * (box.left + box.right), box.bottom + 0.3, text, ha="center", fontsize=8, color=GREY, zorder=4
+                0.5 * (box.left + box.right), box.bottom + 0.1, text, ha="center", fontsize=8, color=GREY, zorder=4
             )
 
 
