@@ -38,7 +38,8 @@ EXIT_CODES = """## Exit codes
 | code | meaning |
 |---|---|
 | 0 | done; also a campaign with failed flights, or a model that `validate` calls bad: the first line has the verdict |
-| 1 | a process or user code failed, a host left, no memory; a missed bound: `check --accuracy`, `stability`, `tune` |
+| 1 | a process or user code failed, a host left, no memory; a missed bound: \
+`check --accuracy`, `stability`, `tune`; an invalid scene of `test` |
 | 2 | invalid input, or an output that cannot be written (full disk) |
 | 3 | the digests, final states or logs differ: `verify`, `resimulate`, `run --campaign` |
 | 4 | the vehicle flew, but does not meet `success.require` of the scene: `run`, `test` |
