@@ -14,6 +14,7 @@ from mcap.reader import make_reader
 from mcap.writer import Writer
 from scipy.io import loadmat
 
+from lapwing import fly
 from lapwing.cosim.log import LogReader, LogWriter
 from lapwing.messages import Clock, Point, Pose, Status, VehicleState, header, stamp
 from tests.commands import assert_rejected, run_command
@@ -65,6 +66,14 @@ def test_verify_recomputes_digest(lapwing, tmp_path):
     code, _, err = lapwing("verify", path)
     assert code == 3
     assert f"recorded {'0' * 32}" in err
+
+
+def test_changed_log_ends_resimulation_as_it_ends_verify(tmp_path):
+    path = fly("hover", {"run.duration": 0.1}).save(tmp_path / "a.mcap")
+    with LogReader(path) as log, LogWriter(tmp_path / "b.mcap", log.metadata, log.attachments) as other:
+        for topic, kind, time_ns, payload in list(log.messages())[:-1]:
+            other.write(topic, kind, payload, time_ns)
+    assert_rejected(run_command("resimulate", tmp_path / "b.mcap"), "digests differ", code=3)
 
 
 def test_verify_explains_log_of_another_machine(tmp_path):
