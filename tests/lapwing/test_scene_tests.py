@@ -65,7 +65,8 @@ def test_fixture_flies_and_keeps_flights_of_failed_tests_in_workers(tmp_path):
 
 
 def test_workflow_of_guide_runs_existing_command():
-    guide = Path("docs/guides/continuous_integration.md").read_text()
-    workflow = yaml.safe_load(guide.partition("```yaml\n")[2].partition("```")[0])
+    text = Path("examples/ci/flights.yml").read_text()
+    assert f"```yaml\n{text}```" in Path("docs/guides/continuous_integration.md").read_text()
+    workflow = yaml.safe_load(text)
     commands = [step["run"] for step in workflow["jobs"]["fly"]["steps"] if "run" in step]
     assert any("lapwing test scenes --junit flights.xml --keep failed" in command for command in commands)
