@@ -9,7 +9,7 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import check_distinct, check_not_dash, claim, claim_folder, claim_report
-from lapwing.cli.preflight import check_firmware_program, with_solver_selected
+from lapwing.cli.preflight import check_firmware_program, print_warnings, with_solver_selected
 from lapwing.cosim.optional_packages import missing
 
 if TYPE_CHECKING:
@@ -97,6 +97,7 @@ def campaign(
         claim_report("--report", report)
         selected_part = _parse_shard(shard)
 
+        from lapwing.services.scene_resolver import resolve
         from lapwing.studies.campaign.plan import SEED, plan  # imports scipy
 
         if any(text.partition("=")[0].strip() == SEED for text in set_ or []):
@@ -108,6 +109,7 @@ def campaign(
             raise ValueError(f"--{error}") from None
         selected = with_solver_selected(scene, set_ or [])
         check_firmware_program(selected)
+        print_warnings(selected, resolve(selected))
         campaign_plan = campaign_plan._replace(overrides=tuple(selected.overrides))
 
         from lapwing.cosim.processes.watchdog import Watchdog

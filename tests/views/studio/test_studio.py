@@ -147,6 +147,7 @@ def test_preview_names_values_of_an_added_effect_once(studio):
     velocity = "effects.wind_constant.velocity"
     assert answer["command"] == f"lapwing run hover --set '{velocity}=[3.0, 0.0, 0.0]' --speed 1"
     assert answer["python"].count("wind_constant") == 1
+    assert answer["warnings"][0].startswith("effects.wind_constant does not move the vehicle")
     assert "wind_constant={velocity = [0.0, 0.0, 0.0]}" in preview(studio, "hover", added)["command"]
 
 
