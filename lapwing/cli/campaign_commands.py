@@ -97,7 +97,6 @@ def campaign(
         claim_report("--report", report)
         selected_part = _parse_shard(shard)
 
-        from lapwing.services.scene_resolver import resolve
         from lapwing.studies.campaign.plan import SEED, plan  # imports scipy
 
         if any(text.partition("=")[0].strip() == SEED for text in set_ or []):
@@ -109,14 +108,15 @@ def campaign(
             raise ValueError(f"--{error}") from None
         selected = with_solver_selected(scene, set_ or [])
         check_firmware_program(selected)
-        print_warnings(selected, resolve(selected))
         campaign_plan = campaign_plan._replace(overrides=tuple(selected.overrides))
 
         from lapwing.cosim.processes.watchdog import Watchdog
+        from lapwing.services.scene_resolver import resolve
         from lapwing.studies.campaign.folder import begin, default_path, manifest
         from lapwing.studies.workers import cores
         from lapwing.views.terminal import console
 
+        print_warnings(selected, resolve(selected))
         stack.enter_context(Watchdog())
         screen = console()
         first = _reference(screen, campaign_plan)
