@@ -6,19 +6,21 @@ import lapwing
 from tests.commands import run_command
 
 SHORT = "run.duration: 5 s end the run before its trajectory; use at least 11 s"
+HOVER = lapwing.load_scene("hover").path.read_text()
 BUILDING = "environment.terrain.box=[{position = [3.0, 0.0], size = [1.0, 1.0], top = 9.0}]"
 
 
 def test_run_shorter_than_its_trajectory_is_a_warning_of_all_commands(tmp_path):
-    assert run_command("check", "hover", "--set", "run.duration=5", code=0).stderr == f"lapwing: warning: {SHORT}\n"
-    words = ("campaign", "hover", "--set", "run.duration=5", "--runs", "2", "--workers", "1", "--out", "short")
-    assert run_command(*words, folder=tmp_path, code=0).stderr.count(SHORT) == 1
-    with pytest.warns(UserWarning, match=SHORT) as caught:
-        lapwing.fly("hover", {"run.duration": 5.0})
-    assert caught[0].filename == __file__
     scene = tmp_path / "short.toml"
-    scene.write_text((lapwing.load_scene("hover").path).read_text().replace("duration = 20.0", "duration = 5.0"))
+    scene.write_text(HOVER.replace("duration = 20.0", "duration = 5.0"))
+    assert run_command("check", scene, code=0).stderr == f"lapwing: warning: {SHORT}\n"
+    assert run_command("check", scene, "--set", "run.duration=4", code=0).stderr == ""  # on purpose
+    words = ("campaign", scene, "--runs", "2", "--workers", "1", "--out", "short")
+    assert run_command(*words, folder=tmp_path, code=0).stderr.count(SHORT) == 1
     assert run_command("test", scene, folder=tmp_path, code=0).stderr == f"lapwing: warning: short: {SHORT}\n"
+    with pytest.warns(UserWarning, match=SHORT) as caught:
+        lapwing.fly(scene)
+    assert caught[0].filename == __file__
 
 
 @pytest.mark.parametrize(("x", "z", "warns"), [(6.0, 4.0, True), (3.0, 12.0, False)])  # through it; onto its roof
