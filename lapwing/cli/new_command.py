@@ -46,8 +46,10 @@ def write_scene(name: str, folder: Path) -> Path:
     """Write a commented scene and return its path. Raise ValueError for an invalid or taken name."""
     from lapwing.services.common.schemas.run_schema import SHIPPED
 
-    if not name.isidentifier() or (SHIPPED / f"{name}.toml").exists():
-        raise ValueError(f"NAME {name}: is invalid or a shipped scene; choose another name, e.g. my_flight")
+    if not name.isidentifier():
+        raise ValueError(f"NAME {name}: expected letters, digits and _, and no digit first, e.g. my_flight")
+    if (SHIPPED / f"{name}.toml").exists():
+        raise ValueError(f"NAME {name}: is a shipped scene; choose another name, e.g. my_flight")
     path = folder / f"{name}.toml"
     if path.exists():
         raise ValueError(f"{path}: already exists; choose another name")

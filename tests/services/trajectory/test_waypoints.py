@@ -99,6 +99,10 @@ def test_resolved_table_has_waypoints_and_validates_again():
             "trajectory.waypoints.1: expected z of at least 0 m, the ground there, got -3 m",
         ),
         ({"speed": -1.0}, "trajectory.speed: expected a number above 0"),
+        (
+            {"speed": "15 kmh"},
+            "expected a number above 0 [m/s], or a text with one of m/s, km/h, kn, mph, got '15 kmh'",
+        ),
         ({"turn": "sharp"}, "trajectory.turn: expected 'stop' or 'round'"),
         (
             {"more": "[[trajectory.phase]]\nname = 'a'"},
@@ -111,6 +115,12 @@ def test_invalid_route_is_rejected_with_its_key(keys, message):
         scene(**keys)
     assert message in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_phase_that_ends_below_the_ground_is_rejected():
+    phase = [{"name": "down", "z": {"kind": "step", "to": -3.0}}]
+    with pytest.raises(SceneError, match=r"phase\.0\.z: expected an end of at least 0 m, the ground there, got -3 m"):
+        load("hover", {"trajectory.phase": phase})
 
 
 def test_speed_without_waypoints_is_rejected():
