@@ -1,5 +1,6 @@
 """Functions of the public interface `lapwing`."""
 
+import warnings
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import ExitStack
@@ -11,6 +12,7 @@ from lapwing.api.flight import Flight
 from lapwing.api.short_errors import short_errors
 from lapwing.cosim.config.run_config import RunConfig
 from lapwing.cosim.scene import Overrides, Scene, SceneError
+from lapwing.runs import scene_warnings
 from lapwing.runs.observer import notify_on_compile
 from lapwing.runs.solver import with_solver
 from lapwing.runs.work_progress import WorkProgress
@@ -79,7 +81,11 @@ def fly(
                 own[f"autopilot.{key}"] = stack.enter_context(register(code, folder))
             if options:
                 own[f"autopilot.{key}_options"] = dict(options)
-        return _fly_with_bar(resolve(load_scene(base, own)))
+        loaded = load_scene(base, own)
+        config = resolve(loaded)
+        for line in scene_warnings.warnings(loaded, config):
+            warnings.warn(line, stacklevel=3)
+        return _fly_with_bar(config)
 
 
 def read_log(log: str | Path) -> Flight:

@@ -9,7 +9,7 @@ import typer
 from lapwing.cli.app import app
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import check_distinct, check_not_dash, claim, claim_folder, claim_report
-from lapwing.cli.preflight import check_firmware_program, with_solver_selected
+from lapwing.cli.preflight import check_firmware_program, print_warnings, with_solver_selected
 from lapwing.cosim.optional_packages import missing
 
 if TYPE_CHECKING:
@@ -111,10 +111,12 @@ def campaign(
         campaign_plan = campaign_plan._replace(overrides=tuple(selected.overrides))
 
         from lapwing.cosim.processes.watchdog import Watchdog
+        from lapwing.services.scene_resolver import resolve
         from lapwing.studies.campaign.folder import begin, default_path, manifest
         from lapwing.studies.workers import cores
         from lapwing.views.terminal import console
 
+        print_warnings(selected, resolve(selected))
         stack.enter_context(Watchdog())
         screen = console()
         first = _reference(screen, campaign_plan)

@@ -47,7 +47,7 @@ def write_scene(name: str, folder: Path) -> Path:
     from lapwing.services.common.schemas.run_schema import SHIPPED
 
     if not name.isidentifier():
-        raise ValueError(f"NAME {name}: expected letters, digits and _, with a letter first, e.g. my_flight")
+        raise ValueError(f"NAME {name}: expected letters, digits and _, and no digit first, e.g. my_flight")
     if (SHIPPED / f"{name}.toml").exists():
         raise ValueError(f"NAME {name}: is a shipped scene; choose another name, e.g. my_flight")
     path = folder / f"{name}.toml"

@@ -1,6 +1,7 @@
 """`lapwing test`: flights of a folder of scenes against their own criteria, for continuous integration."""
 
 import time
+import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -74,7 +75,10 @@ def _result(path: Path, keep: Path) -> tuple[str, str]:
 
     try:
         scene = load_scene(path)
-        flight = fly(scene)
+        with warnings.catch_warnings(record=True) as caught:
+            flight = fly(scene)
+        for each in caught:
+            typer.echo(f"lapwing: warning: {path.stem}: {each.message}", err=True)
         shortfall = "" if flight.failure else scene[Success].shortfall(metrics(flight))
     except ValueError as error:
         return BROKEN, str(error)

@@ -121,17 +121,14 @@ def fault(error: ValidationError, model: type) -> ConfigError:
     if kind == "value_error":
         cause = context["error"]
         return cause.with_prefix(key) if isinstance(cause, ConfigError) else ConfigError(key, str(cause))
-    expectation = _expectation(kind, first["msg"], context, hint)
-    if kind == "tuple_type" and isinstance(value, dict) and describe(hint) == "a list of tables":
-        expectation = f"a list of tables, each below double brackets: [[...{location[-1]}]]"
-    if kind in OF_NUMBERS and (unit := _unit(model, location)):
-        accepted = units.UNITS.get(unit.strip(" []"), {})
-        expectation += unit
-        if isinstance(value, str) and accepted:
-            expectation += f", or a text in {', '.join(accepted)}"
-        elif "rad" in unit and isinstance(location[-1], str):
-            expectation += f", or {location[-1]}_deg"
-    return ConfigError(key, f"got {_short(value)}", expectation)
+    if kind == "tuple_type" and isinstance(value, Mapping) and describe(hint) == "a list of tables":
+        return ConfigError(key, "got one table", "a list of tables, with [[ ]] around its name")
+    unit = _unit(model, location) if kind in OF_NUMBERS else ""
+    if isinstance(value, str) and units.NUMBER.match(value) and (known := units.UNITS.get(unit.strip(" []"))):
+        unit += f", or a text with one of {', '.join(known)}"
+    elif unit == " [rad]" and isinstance(value, float | int) and abs(value) > 2.0 * units.PI:
+        unit += f", or {location[-1]}_deg"
+    return ConfigError(key, f"got {_short(value)}", _expectation(kind, first["msg"], context, hint) + unit)
 
 
 def _unit(model: type, location: Sequence[str | int]) -> str:

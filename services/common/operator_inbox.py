@@ -23,8 +23,8 @@ def no_operator(_: int) -> Iterable[OperatorCommand]:
 
 
 def accepts_commands(member: RunConfig) -> bool:
-    """Return True if the autopilot of a vehicle, of whose run configuration alone, accepts commands."""
-    return "autopilot" in member.services and bool(member.services["autopilot"].parameters.operator)
+    """Return True if the scene of a vehicle, given its run configuration alone, accepts commands."""
+    return "autopilot" in member.services and bool(member.resolved["autopilot"]["accept_commands"])
 
 
 class OperatorInbox:

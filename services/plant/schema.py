@@ -34,7 +34,7 @@ class Solver(SceneTable):
     """
 
     TABLE: ClassVar[str] = "solver"
-    integrator: str = "rk4_renormalised"  # a module of lapwing/dynamics/integrators
+    integrator: str = "rk4_renormalised"  # method of integration
     step: float = Field(default=0.001, ge=1e-9)  # [s], divides the communication step
     accuracy: float | None = Field(default=None, ge=1e-12)  # largest error relative to 1 + size; selects both others
 

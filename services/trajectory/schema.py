@@ -43,18 +43,21 @@ from lapwing.cosim.scene.files import unvalidated_value
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.dynamics.terrain import Level, surface
 from lapwing.dynamics.validation import validated
+from lapwing.kernels import python_function
 from lapwing.services.common import user_modules
 from lapwing.services.common.schemas.environment_schema import environment
 from lapwing.services.common.schemas.place_schema import home_of
 from lapwing.services.common.schemas.vehicle_schema import Vehicle, start_place
 from lapwing.services.trajectory import phases, waypoints
 from lapwing.services.trajectory.phases import Phases
+from lapwing.services.trajectory.polynomial_piece import channel_at
 from lapwing.services.trajectory.segments.segment import Segment
 from lapwing.services.trajectory.trajectory_compiler import CHANNELS, GROUNDED, CompiledTrajectory, compile
 from lapwing.services.trajectory.waypoints import Route, Waypoint
 
 ROUTE = set(Route.model_fields)
 TABLE_HEADER = ["time", "value"]
+_channel_at = python_function(channel_at)
 
 
 class Trajectory(Route, Phases, SceneTable):
@@ -109,13 +112,18 @@ class Trajectory(Route, Phases, SceneTable):
 
     def check(self, scene: Scene) -> None:
         """Raise ConfigError for gaps between segments, short phases, points below ground, a frame without a leader."""
-        compile_trajectory(scene)
+        path, _, duration, _ = compile_trajectory(scene)
         ground = _ground(scene)
         for i, (x, y, z, *_) in enumerate(() if self.leader else self.waypoints):
             if z < (height := ground(x, y)) - GROUNDED:
                 raise ConfigError(
                     f"trajectory.waypoints.{i}", f"got {z:g} m", f"z of at least {height:.3g} m, the ground there"
                 )
+        for i, end in enumerate(() if self.leader or self.waypoints else (*path.phase_start[1:], duration)):
+            x, y, z = (_channel_at(channel, end)[0] for channel in (path.x, path.y, path.z))
+            if z < (height := min(0.0, ground(x, y))) - GROUNDED:
+                expected = f"an end of at least {height:.3g} m, the ground there"
+                raise ConfigError(f"trajectory.phase.{i}.z", f"got {z:g} m", expected)
         if self.frame and not self.leader:
             raise ConfigError("trajectory.frame", "has no leader", "trajectory.leader, or no frame")
 

@@ -20,6 +20,7 @@ Points = Annotated[tuple[Point, ...], Field(strict=False, min_length=1)]
 PEAK = 1.875  # largest speed of a minimum-jerk motion over its mean
 VERTICAL = 1.0  # [m/s] largest speed of take-off and landing
 YAW_RATE = 1.0  # [rad/s] largest rate of the heading on a leg that ends with a stop
+ACCELERATION = 2.0  # [m/s^2] a leg is curved, or changes its speed, within speed^2 / ACCELERATION of its ends
 REST = 2.0  # [s] at the end
 SHORTEST = 1e-3  # [m] between neighbouring points
 
@@ -53,7 +54,7 @@ def phases(route: Route) -> list[dict[str, Any]]:
     The vehicle climbs to the height of the first point and flies straight legs to the points, at most at `speed` [m/s].
     A fourth number of a point is its yaw [rad], which the vehicle turns to on the leg, the shorter way round.
     It stops at each point, or with turn = "round" passes it in the mean direction of its legs, the slower the sharper
-    the turn, and leaves the straight line for it.
+    the turn, and leaves the straight line for it near the point.
 
     Raises:
         ConfigError: a point repeats the one before; the key is relative to the table.
@@ -64,25 +65,28 @@ def phases(route: Route) -> list[dict[str, Any]]:
     path = [(0.0, 0.0, climb), *points]
     if dist(path[0], path[1]) < SHORTEST:
         del path[0]
-    result = [_leg("take-off", {"z": climb}, PEAK * climb / slow)] if climb > 0.0 else []
+    result = [_phase("take-off", {"z": [_through(climb, PEAK * climb / slow)]})] if climb > 0.0 else []
     first = len(points) - len(path) + 2
     if first == 2 and turns[0]:  # the first point is above the start
-        result.append(_leg("turn", {"yaw": turns[0].end}, PEAK * abs(turns[0].change) / YAW_RATE))
+        result.append(_phase("turn", {"yaw": [_through(turns[0].end, PEAK * abs(turns[0].change) / YAW_RATE)]}))
     for number, (a, b) in enumerate(pairwise(path), start=first):
         if dist(a, b) < SHORTEST:
             raise ConfigError(f"waypoints.{number - 1}", f"got {list(b)} like the point before", "another point")
     rates = _rates(path, speed if route.turn == "round" else 0.0)
     for number, ((a, b), (u, v)) in enumerate(zip(pairwise(path), pairwise(rates), strict=True), start=first):
-        pace = 0.5 * (dist(ZERO, u) + dist(ZERO, v))  # the mean, as the speed changes evenly between the ends
-        duration = dist(a, b) / pace if pace > 0.0 else PEAK * dist(a, b) / speed
-        ends = dict(zip("xyz", b, strict=True))
-        if turn := turns[number - 1]:
-            ends["yaw"] = turn.end
-            duration = duration if pace > 0.0 else max(duration, PEAK * abs(turn.change) / YAW_RATE)
-        result.append(_leg(f"waypoint {number}", ends, duration, u, v))
+        turn, straight = turns[number - 1], u == v == ZERO
+        least = PEAK * abs(turn.change) / YAW_RATE if turn and straight else 0.0
+        parts = [(b, max(PEAK * dist(a, b) / speed, least), u, v)] if straight else _parts(a, b, u, v, speed)
+        channels = {
+            channel: [_through(to[i], duration, first[i], last[i]) for to, duration, first, last in parts]
+            for i, channel in enumerate("xyz")
+        }
+        if turn:
+            channels["yaw"] = [_through(turn.end, math.total(duration for _, duration, *_ in parts))]
+        result.append(_phase(f"waypoint {number}", channels))
     end = points[-1][2]
     if route.land and end > 0.0:
-        result.append(_leg("landing", {"z": 0.0}, PEAK * end / slow))
+        result.append(_phase("landing", {"z": [_through(0.0, PEAK * end / slow)]}))
     return [*result, {"name": "rest" if route.land else "hover", "duration": REST}]
 
 
@@ -109,10 +113,22 @@ def _rates(path: Sequence[Point], speed: float) -> list[Point]:
     return [ZERO, *((x, y, z) for x, y, z in inner), *[ZERO] * (len(path) > 1)]
 
 
-def _leg(name: str, ends: dict[str, float], duration: float, first: Point = ZERO, last: Point = ZERO) -> dict[str, Any]:
-    rates = dict(zip("xyz", zip(first, last, strict=True), strict=True), yaw=(0.0, 0.0))
-    return {"name": name} | {
-        channel: {"kind": "through", "to": to, "duration": duration}
-        | dict(zip(("start_rate", "end_rate"), rates[channel], strict=True))
-        for channel, to in ends.items()
-    }
+def _parts(a: Point, b: Point, u: Point, v: Point, speed: float) -> list[tuple[Point, float, Point, Point]]:
+    """Return end, duration [s] and velocities at both ends [m/s] of the parts of a leg: straight between two curves."""
+    length = dist(a, b)
+    along = tuple((q - p) / length for p, q in zip(a, b, strict=True))
+    cruise = tuple(speed * each for each in along)
+    reach = min(speed * speed / ACCELERATION, 0.5 * length)
+    reach = reach if length - 2.0 * reach > SHORTEST else 0.5 * length
+    first, last = (tuple(p + way * each for p, each in zip(a, along, strict=True)) for way in (reach, length - reach))
+    paces = [0.5 * (speed + math.total(p * q for p, q in zip(end, along, strict=True))) for end in (u, v)]  # along it
+    middle = [(last, (length - 2.0 * reach) / speed, cruise, cruise)] if 2.0 * reach < length else []
+    return [(first, reach / paces[0], u, cruise), *middle, (b, reach / paces[1], cruise, v)]
+
+
+def _phase(name: str, channels: dict[str, list[dict[str, Any]]]) -> dict[str, Any]:
+    return {"name": name, **channels}
+
+
+def _through(to: float, duration: float, first: float = 0.0, last: float = 0.0) -> dict[str, Any]:
+    return {"kind": "through", "to": to, "duration": duration, "start_rate": first, "end_rate": last}

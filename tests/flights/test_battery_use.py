@@ -65,7 +65,7 @@ def test_unmodelled_battery_is_left_out():
 
 
 def test_key_number_has_charge_left():
-    (left,) = [number for number in key_numbers(flight()) if number.label.startswith("battery left")]
+    (left,) = [number for number in key_numbers(flight()) if number.label == "battery left"]
     assert (left.value, left.unit) == (pytest.approx(100.0 * (0.5 - CURRENT * HOURS / CAPACITY)), "%")
 
 

@@ -56,6 +56,14 @@ def test_report_shows_all_paths(flown):
     )
 
 
+def test_report_overlays_a_single_vehicle(flown):
+    """Once: min() arg is an empty sequence."""
+    folder, _, _ = flown
+    command("run", "hover", "--set", "run.duration=1", "--mode", "single-process", "--log", folder / "alone.mcap")
+    command("report", folder / "a.mcap", folder / "alone.mcap", "--out", folder / "both.html")
+    assert "alone: a single vehicle" in page_text(folder / "both.html")
+
+
 def test_info_verify_and_resimulate_accept_log_of_fleet(flown):
     folder, _, figures = flown
     log = folder / "a.mcap"

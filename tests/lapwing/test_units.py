@@ -123,16 +123,8 @@ def _changed(tree, key, value):
 @pytest.mark.parametrize(
     ("key", "value", "message"),
     [
-        (
-            "run.duration",
-            "30 m",
-            "run.duration: expected a number above 0 and at most 1e+06 [s], or a text in s, ms, min, h, got '30 m'",
-        ),
-        (
-            "run.duration",
-            "30",
-            "run.duration: expected a number above 0 and at most 1e+06 [s], or a text in s, ms, min, h, got '30'",
-        ),
+        ("run.duration", "30 m", "above 0 and at most 1e+06 [s], or a text with one of s, ms, min, h, got '30 m'"),
+        ("run.duration", "30", "above 0 and at most 1e+06 [s], or a text with one of s, ms, min, h, got '30'"),
         ("effects.wind_constant.velocity", ["3 kg", 0.0, 0.0], "effects.wind_constant.velocity.0: expected a number"),
     ],
 )

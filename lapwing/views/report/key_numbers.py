@@ -25,6 +25,7 @@ class KeyNumber(NamedTuple):
     source: str = ""  # source of the limit
     at_least: bool = False
     worst: float = math.nan  # value above which the number is bad instead of doubtful
+    also: str = ""  # after the value and its unit
 
     @property
     def mark(self) -> Mark | Literal[""]:
@@ -39,7 +40,7 @@ class KeyNumber(NamedTuple):
     def text(self) -> str:
         """Value with its unit; a length below 1 cm in millimetres."""
         small = self.unit == "m" and 0.0 < self.value < 0.01
-        return f"{1e3 * self.value:.3g} mm" if small else f"{self.value:.3g} {self.unit}"
+        return f"{1e3 * self.value:.3g} mm" if small else f"{self.value:.3g} {self.unit}{self.also}"
 
     @property
     def comparison(self) -> str:
@@ -69,8 +70,8 @@ def key_numbers(flight: FlightData) -> list[KeyNumber]:
         numbers.append(KeyNumber("distance from target", outcome.target_distance, "m", LANDING_RADIUS, "landed there"))
     if use := battery_use(flight):
         limit = None if use.low_threshold is None else 100.0 * use.low_threshold
-        left = KeyNumber("battery left", 100.0 * use.charge_left, "%", limit, "warning", at_least=True)
-        numbers.append(left._replace(label=f"{left.label}, {use.energy_left:.3g} W h"))
+        charge, energy = 100.0 * use.charge_left, f", {use.energy_left:.3g} W h"
+        numbers.append(KeyNumber("battery left", charge, "%", limit, "warning", at_least=True, also=energy))
     elif _has_power(flight):
         with suppress(ValueError):  # the log has no run configuration
             numbers.append(KeyNumber("energy of the motors", flight.energy / WATT_HOUR, "W h"))

@@ -226,7 +226,7 @@ def _bounds(part: Schema) -> str:
     low, above = part.get("minimum"), part.get("exclusiveMinimum")
     high, below = part.get("maximum"), part.get("exclusiveMaximum")
     least = f"{low:g}" if low is not None else f"above {above:g}" if above is not None else ""
-    most = f"{high:g}" if high is not None else f"below {below:.3g}" if below is not None else ""
+    most = f"{high:g}" if high is not None else f"below {below:.3g}" if below is not None and below < 2**63 else ""
     if least and most:
         return f"{least} to {most}"
     return (f"at least {least}" if low is not None else least) or (f"at most {most}" if high is not None else most)

@@ -28,13 +28,13 @@ from lapwing.views.studio.scene_forms import (
     command_line,
     form_changes,
     load_named,
+    paths_and_warnings,
     posted_form,
     python,
     scene_files,
     schema,
     tables,
     toml_text,
-    tracks,
 )
 from lapwing.views.view3d import MISSING as NO_VIEW
 from lapwing.views.view3d import available
@@ -173,11 +173,16 @@ class Pages:
         """Return the command line, the Python code and the faults of a posted form as JSON."""
         name, posted, added = await posted_form(request)
         changed, faults, error = await run_in_threadpool(form_changes, name, posted, added)
-        paths = [] if faults or error else await run_in_threadpool(lambda: tracks(load_named(name, changed)))
+        paths, warnings = (
+            ([], [])
+            if faults or error
+            else await run_in_threadpool(lambda: paths_and_warnings(load_named(name, changed)))
+        )
         command = command_line(name, changed, posted.get("speed", ""), posted.get("view") == "yes")
-        result = {"command": shlex.join(command), "python": python(name, changed), "toml": toml_text(name, changed)}
+        texts = {"command": shlex.join(command), "python": python(name, changed), "toml": toml_text(name, changed)}
         keys = [change.key for change in changed]
-        return JSONResponse({**result, "changed": keys, "faults": faults, "error": error, "paths": paths})
+        seen = {"changed": keys, "faults": faults, "paths": paths, "warnings": warnings}
+        return JSONResponse({**texts, **seen, "error": error})
 
     async def start(self, request: Request) -> Response:
         """Start a run of a posted form and show it; show the form again if it has faults."""

@@ -1,5 +1,6 @@
 """Logs in the folder of recordings: summary, picture and report of each."""
 
+import re
 import threading
 from collections.abc import Sequence
 from contextlib import suppress
@@ -23,7 +24,7 @@ WIDTH, HEIGHT, MARGIN = 240.0, 150.0, 14.0  # [pixel]
 POINTS = 160  # largest number of points of a path
 SMALLEST = 0.5  # [m] minimum extent of the view, so that a hover does not show noise
 AZIMUTH, ELEVATION = np.radians(35.0), np.radians(28.0)  # [rad] direction of the viewer
-
+DATED = re.compile(r"_(\d{4}-\d\d-\d\d)T(\d\d)-(\d\d)-(\d\d)")  # in the name of a log
 
 Point = tuple[float, float]
 Stroke = tuple[float, float, float, float]  # x and y of both ends
@@ -151,7 +152,7 @@ class RecentFlights:
             with suppress(OSError):  # deleted meanwhile
                 status = path.stat()
                 if S_ISREG(status.st_mode) and status.st_size and not is_locked(path):
-                    dated.append((status.st_mtime_ns, path.name))
+                    dated.append((_recorded(path.stem, status.st_mtime_ns), path.name))
         return [name for _, name in sorted(dated, reverse=True)[:MOST]]
 
     def path(self, name: str) -> Path:
@@ -191,8 +192,15 @@ class RecentFlights:
         return target
 
 
+def _recorded(name: str, modified_ns: int) -> str:
+    """Return the local date and time of a log by its name, which `lapwing run` gives, or else by its file."""
+    if match := DATED.search(name):
+        return "{} {}:{}:{}".format(*match.groups())
+    return datetime.fromtimestamp(modified_ns * 1e-9).strftime("%Y-%m-%d %H:%M:%S")
+
+
 def _summary(path: Path) -> FlightSummary:
-    recorded = datetime.fromtimestamp(modification_time(path) * 1e-9).strftime("%Y-%m-%d %H:%M")
+    recorded = _recorded(path.stem, modification_time(path))[:-3]
     try:
         flights = [flight for flight in Flight.read_all(path, SHOWN) if len(flight.truth)]
         if not flights:

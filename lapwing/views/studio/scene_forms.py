@@ -18,6 +18,7 @@ from lapwing.cosim.scene.toml_text import dump, toml
 from lapwing.dynamics import units
 from lapwing.file_schemas.annotations import Schema
 from lapwing.file_schemas.json_schema import scene_schema
+from lapwing.runs.scene_warnings import warnings
 from lapwing.services.common.schemas.run_schema import SHIPPED
 from lapwing.services.scene_resolver import load, resolve
 from lapwing.services.trajectory.service import NAME as TRAJECTORY
@@ -177,15 +178,15 @@ def tables(keys: Iterable[str]) -> list[Change]:
     return [Change(key, starting_values(schema(), key)) for key in keys]
 
 
-def tracks(scene: Scene) -> list[list[tuple[float, ...]]]:
-    """Return the path that the trajectory of each vehicle orders: places [m], world."""
-    result = []
-    for member in members(resolve(scene)):
+def paths_and_warnings(scene: Scene) -> tuple[list[list[tuple[float, ...]]], list[str]]:
+    """Return the path that the trajectory of each vehicle orders, places [m], world; and the warnings of the scene."""
+    result, config = [], resolve(scene)
+    for member in members(config):
         service = member.services.get(TRAJECTORY)
         if service is not None and isinstance(service.parameters, TrajectoryConfig):
             places = (place for _, _, *place in service.parameters.track(member.duration, MOST_PLACES))
             result.append([tuple(round(value, 2) for value in place) for place in places])
-    return result
+    return result, list(warnings(scene, config))
 
 
 async def posted_form(request: Request) -> tuple[str, dict[str, str], tuple[str, ...]]:

@@ -55,11 +55,12 @@
   if (form) {
     let timer = 0, latest = 0;
     const named = (key) => all("[data-key]", form).find((field) => field.dataset.key === key);
-    const show = ({ command, python, toml, changed, faults, error, paths }) => {
+    const show = ({ command, python, toml, changed, faults, error, paths, warnings }) => {
       if (!error && !Object.keys(faults).length) form.dispatchEvent(new CustomEvent("paths", { detail: paths }));
       document.querySelector("#toml").textContent = toml || "# no changes";
       document.querySelector("#command").textContent = command;
       document.querySelector("#python").textContent = python;
+      document.querySelector("#warnings").textContent = warnings.join("\n");
       const problem = document.querySelector("#problem");
       if (error || latest > 1) { // the first preview keeps the fault of the page
         problem.hidden = !error;

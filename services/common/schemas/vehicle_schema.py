@@ -33,15 +33,13 @@ STEEPEST_START = 46.0  # [deg] initial tilt; terrain is at most 45 degrees steep
 
 
 class Vehicle(SceneTable):
-    """The vehicle. For several, write [[vehicle]] for each one: the other tables of the scene are those of all, and one
-    below it, such as [vehicle.autopilot], replaces keys of it for this vehicle.
-    """
+    """The vehicle; for several, a table `[[vehicle]]` each, with the keys that differ, as in the scene fleet."""
 
     TABLE: ClassVar[str] = "vehicle"
     DISTINCT: ClassVar[str] = "name"
     name: str = Field(default="drone1", pattern=r"^[A-Za-z][A-Za-z0-9_]*$")  # first part of its topics' names
     airframe: str | None = None  # shipped, in vehicles/ next to the scene, or the path of a .toml file
-    model: str = "rigid_body"  # a module of services/plant/models
+    model: str = "rigid_body"  # equations of motion
     mass: float | None = Field(default=None, gt=0.0)  # [kg] with payload, instead of airframe.mass.total
     initial_position: Pair | None = None  # [m] east and north of home, also of its trajectory; default: home
 
@@ -95,7 +93,7 @@ class VehicleAirframe(Airframe, SceneTable):
 
 
 class Effects(NamedTables):
-    """Physical effects: one table per effect of lapwing/dynamics/effects or of a user module."""
+    """Physical effects, a table for each; also effects of your own, with the key `module`."""
 
     TABLE: ClassVar[str] = "effects"
 

@@ -126,7 +126,7 @@ def test_choices_are_listed():
         ("gains.altitude=[1, 2]", "override gains.altitude.2: missing; expected a number"),
         (
             "gains.tilt_limit=1.5",
-            "override gains.tilt_limit: expected a number above 0 and below 1.4 [rad], or tilt_limit_deg, got 1.5",
+            "override gains.tilt_limit: expected a number above 0 and below 1.4 [rad], got 1.5",
         ),
         ("autopilot.parameters=none.params", "override autopilot.parameters: lapwing/scenes/none.params: no such file"),
         ("autopilot.parameters.MPC_TKO_SPEED=9", "MPC_TKO_SPEED: expected a number from 0.1 to 5, got 9"),

@@ -33,7 +33,7 @@ def test_error_is_one_line(tmp_path):
         "short.toml": (text.replace("altitude = [28.0, 22.0, 18.0]", "altitude = [28.0]"), "altitude"),
         "upright.toml": (
             text.replace("tilt_limit = 1.028", "tilt_limit = 1.6"),
-            "tilt_limit: expected a number above 0 and below 1.4 [rad], or tilt_limit_deg, got 1.6",
+            "tilt_limit: expected a number above 0 and below 1.4 [rad], got 1.6",
         ),
     }
     for name, (content, message) in cases.items():

@@ -87,7 +87,7 @@ def test_recorded_scene_needs_no_terrain_file(tmp_path):
             "magnetic_field.0: expected a number at least -0.0001 and at most 0.0001",
         ),
         ({"atmosphere": {"sea_level_pressure": 1013.0}}, "sea_level_pressure: expected a number at least 85000"),
-        ({"terrain": {"box": {"size": [1.0, 1.0, 1.0]}}}, "terrain.box: expected a list of tables, each below double"),
+        ({"terrain": {"box": {"size": [1.0, 1.0, 1.0]}}}, "terrain.box: expected a list of tables, with [[ ]]"),
         ({"terrain": {"slop": [0.0, 0.0]}}, "terrain.slop: unknown key 'slop'; did you mean slope?"),
         ({"terrain": {"slope": [0.9, 0.9]}}, "terrain.slope: ground steeper than 45 degrees"),
         (

@@ -68,6 +68,19 @@ def test_route_on_one_line_keeps_its_speed_at_points():
     assert places[-1] == pytest.approx(points[-1])
 
 
+def test_round_turn_leaves_legs_near_points_only():
+    """A leg to a sharp turn, once flown at a quarter of the speed and 6 m beside the line."""
+    points = np.array([[0.0, 0.0, 3.0], [12.0, 18.0, 6.0], [12.0, 2.0, 6.0]])
+    times, places, rates, _ = flown(waypoints=points.tolist(), speed=4.0, turn="round", land=False)
+    assert np.linalg.norm(rates, axis=1).max() == pytest.approx(4.0, rel=0.01)
+    legs = np.diff(points, axis=0)
+    along = [np.clip((places - start) @ leg / (leg @ leg), 0.0, 1.0) for start, leg in zip(points, legs, strict=False)]
+    beside = [np.linalg.norm(places - start - at[:, None] * leg, axis=1)
+              for start, leg, at in zip(points, legs, along, strict=False)]  # fmt: skip
+    assert 0.1 < np.min(beside, axis=0)[places[:, 2] >= 3.0].max() < 1.0
+    assert times[-1] < 25.0
+
+
 def test_resolved_table_has_waypoints_and_validates_again():
     first = scene(turn="round")
     assert "phase" not in first.resolved["trajectory"]
@@ -86,6 +99,10 @@ def test_resolved_table_has_waypoints_and_validates_again():
             "trajectory.waypoints.1: expected z of at least 0 m, the ground there, got -3 m",
         ),
         ({"speed": -1.0}, "trajectory.speed: expected a number above 0"),
+        (
+            {"speed": "15 kmh"},
+            "expected a number above 0 [m/s], or a text with one of m/s, km/h, kn, mph, got '15 kmh'",
+        ),
         ({"turn": "sharp"}, "trajectory.turn: expected 'stop' or 'round'"),
         (
             {"more": "[[trajectory.phase]]\nname = 'a'"},
@@ -98,6 +115,12 @@ def test_invalid_route_is_rejected_with_its_key(keys, message):
         scene(**keys)
     assert message in str(error.value)
     assert "\n" not in str(error.value)
+
+
+def test_phase_that_ends_below_the_ground_is_rejected():
+    phase = [{"name": "down", "z": {"kind": "step", "to": -3.0}}]
+    with pytest.raises(SceneError, match=r"phase\.0\.z: expected an end of at least 0 m, the ground there, got -3 m"):
+        load("hover", {"trajectory.phase": phase})
 
 
 def test_speed_without_waypoints_is_rejected():

@@ -13,6 +13,7 @@ import pytest
 from lapwing.cosim.log import LogReader
 from lapwing.runs.resimulate import recorded_config
 from lapwing.services.common.schemas.run_schema import SHIPPED
+from lapwing.views.studio import recent_flights
 
 pytest.importorskip("starlette", reason="needs starlette (pip install lapwing[studio])")
 pytest.importorskip("uvicorn", reason="needs uvicorn (pip install lapwing[studio])")
@@ -137,6 +138,12 @@ def test_preview_names_command_python_and_faults(studio):
     assert answer["faults"] == {"run.duration": "expected a number above 0 and at most 1e+06 [s], got -1.0"}
 
 
+def test_date_of_a_flight_is_that_in_the_name_of_its_log():
+    recorded = recent_flights._recorded
+    assert recorded("hover_2026-01-02T03-04-05", 0) == "2026-01-02 03:04:05"
+    assert recorded("hover", 10**18)[:7] == "2001-09"
+
+
 def preview(studio, scene, fields):
     return json.loads(studio.request(f"scenes/{scene}/preview", fields)[1])
 
@@ -147,6 +154,7 @@ def test_preview_names_values_of_an_added_effect_once(studio):
     velocity = "effects.wind_constant.velocity"
     assert answer["command"] == f"lapwing run hover --set '{velocity}=[3.0, 0.0, 0.0]' --speed 1"
     assert answer["python"].count("wind_constant") == 1
+    assert answer["warnings"][0].startswith("effects.wind_constant does not move the vehicle")
     assert "wind_constant={velocity = [0.0, 0.0, 0.0]}" in preview(studio, "hover", added)["command"]
 
 

@@ -2,7 +2,7 @@
 
 from lapwing.flights.flight_data import FlightData
 from lapwing.flights.separation import least_over_time, nearest
-from lapwing.views.report.plot import Level, Line, Panel, Plot
+from lapwing.views.report.plot import Level, Line, NotRecordedError, Panel, Plot
 from lapwing.views.report.style import COLOURS
 
 ORDER = 42
@@ -13,6 +13,8 @@ FLEET = True
 
 def draw(flight: FlightData) -> Plot:
     """Plot the plan view on the left, the minimum separation over time on the right."""
+    if len(flight.fleet) < 2:
+        raise NotRecordedError("a single vehicle")
     marks = []
     for i, (name, truth) in enumerate(flight.fleet.items()):
         x, y, _ = truth.position.T
