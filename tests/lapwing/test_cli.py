@@ -30,6 +30,10 @@ BAD = {
     "no number": ([HOVER, "--run", "abc"], "--run abc: expected a valid integer (see lapwing run --help)"),
     "list": ([HOVER, "--set", 'success.require="time"'], "--set success.require: expected a list, got 'time'"),
     "success": ([HOVER, "--set", 'success.require=["tim < 3"]'], "unknown metric 'tim'; did you mean time?"),
+    "no outcome": (
+        [HOVER, "--set", "success.require=[\"outcome == 'landde'\"]"],
+        "'landde' is not an outcome; did you mean landed?",
+    ),
     "no condition": ([HOVER, "--set", 'success.require=["rmse.z"]'], "'rmse.z' is a number, not true or false"),
     "unlike types": ([HOVER, "--set", "success.require=[\"'a' < 1\"]"], "is a text, '1' is a number"),
     "zero divisor": ([HOVER, "--set", 'success.require=["1/0 > 1"]'], "cannot be computed: division by zero"),
