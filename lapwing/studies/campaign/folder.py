@@ -155,7 +155,12 @@ def begin(path: Path, plan: Plan, about: dict[str, Any]) -> Folder:
     if not (path / MANIFEST).exists():
         _create(path, about)
     existing = read(path).about  # another machine may have started the campaign
-    differing = [name for name in about if name != "path" and existing.get(name) != about[name]]
+    compared = about.keys() - {"path", "sources", "end_state"}
+    differing = [name for name in about if name in compared and existing.get(name) != about[name]]
+    before, now = existing.get("sources", {}), about["sources"]
+    differing += [name for name in {**before, **now} if before.get(name) != now.get(name)]
+    if not differing and existing.get("end_state") != about["end_state"]:
+        differing = [f"final state of run {about['run']}"]
     if differing:
         raise ValueError(
             f"{path}: contains another campaign (differences: {', '.join(differing)}); expected a new folder"

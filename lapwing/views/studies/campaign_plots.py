@@ -205,7 +205,7 @@ def sensitivity(results: Results) -> Plot:
         if independent
         else ". Shares of the variance need independent parameters, unlike those of a sweep."
     )
-    caption += " Grey: not distinguishable from 0, because the 95 % interval contains it."
+    caption += " Grey: not distinguishable from 0, because the interval contains it (95 % for all parameters together)."
     height = len(targets) * (1.1 + 0.26 * len(keys)) + 0.6
     return Plot(tuple(panels), caption, height, (1.0,) * len(targets), (1.0,) * len(kinds))
 
