@@ -21,7 +21,7 @@ import numpy as np
 from lapwing.cosim.complete_file import complete_file
 from lapwing.cosim.output_lock import write_errors
 from lapwing.cosim.run_errors import RunFailed
-from lapwing.services.common.schemas.run_schema import Published
+from lapwing.services.common.schemas.run_schema import published_figures
 from lapwing.services.common.schemas.success_criteria import Success
 from lapwing.studies.campaign import run_table
 from lapwing.studies.campaign.distributions import parse
@@ -133,7 +133,7 @@ def manifest(plan: Plan, reference: Reference) -> dict[str, Any]:
         "vary": {key: str(distribution) for key, distribution in plan.vary},
         "sources": sources(plan),
         "vehicles": vehicles(plan),
-        "published": {} if scene.vehicles else scene[Published].resolved(),
+        "published": {} if scene.vehicles else published_figures(scene.resolved),
         "success": list(dict.fromkeys(text for each in scene.each_vehicle for text in each[Success].require)),
         **reference._asdict(),
     }
