@@ -54,7 +54,7 @@ def criteria_plot(results: Results) -> Plot:
         if largest == 0.0:
             raise NotRecordedError("no run fails")
         return Plot((shares,), caption, 0.9 + 0.4 * len(bars))
-    caption += f" Right: share of runs with a smaller {metric}, which decides most failures or is nearest to its limit."
+    caption += f" Curve: share of runs with a smaller {metric}, which decides most failures or is nearest to its limit."
     (panel,) = _distributions(results, [metric], "").panels
     both = (shares, panel._replace(column=1, y_label="share of runs"))
     return Plot(both, caption, max(3.2, 0.9 + 0.4 * len(bars)), widths=(1.0, 1.0))
