@@ -83,9 +83,9 @@ def campaign(
             return
         if workers is not None and workers < 1:
             raise ValueError(f"--workers {workers}: expected at least 1")
-        if ci_half_width is not None and not 0.0 < ci_half_width < 1.0:
+        if ci_half_width is not None and not 0.0 < ci_half_width < 0.5:
             raise ValueError(
-                f"--ci-half-width {ci_half_width:g}: expected a probability between 0 and 1, for example 0.01"
+                f"--ci-half-width {ci_half_width:g}: expected a probability above 0 and below 0.5, for example 0.01"
             )
         if ci_half_width is not None and shard is not None:
             raise ValueError("--ci-half-width: needs the results of all runs; leave out --shard")

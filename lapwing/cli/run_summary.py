@@ -17,7 +17,7 @@ from lapwing.flights.flight_data import SHOWN
 from lapwing.flights.metrics import joint_end_state, metrics
 from lapwing.flights.separation import Separation, nearest
 from lapwing.flights.tracking import digits, unit_and_factor
-from lapwing.services.common.schemas.run_schema import Published
+from lapwing.services.common.schemas.run_schema import published_figures
 from lapwing.services.common.schemas.success_criteria import Success
 from lapwing.studies.json_file import write_json
 from lapwing.views import terminal
@@ -103,7 +103,7 @@ def show(console: Console, scene: Scene, result: dict[str, Any]) -> None:
     """Print the summary of a run."""
     _outcome(console, result["outcome"])
     show_events(console, result["events"])
-    _errors(console, scene[Published], result["rmse"])
+    _errors(console, published_figures(scene.resolved), result["rmse"])
     _ending(console, result)
 
 
@@ -146,20 +146,21 @@ def show_events(console: Console, events: list[dict[str, Any]]) -> None:
         console.print(f"{len(events) - MAX_EVENTS} more events not shown (see the report or --json)")
 
 
-def _errors(console: Console, published: Published, rmse: dict[str, float]) -> None:
+def _errors(console: Console, figures: dict[str, Any], rmse: dict[str, float]) -> None:
+    published = figures.get("rmse", {})
     if not any(map(math.isfinite, rmse.values())):
         return  # there is no reference, or the motors were never armed
     console.print("Root-mean-square error against the reference")
     table = Table()
     table.add_column("axis")
     table.add_column("this run", justify="right")
-    if published.rmse:
-        table.add_column(published.source, justify="right")
+    if published:
+        table.add_column(figures.get("source", "published"), justify="right")
     for axis, value in rmse.items():
         unit, scale = unit_and_factor(axis)
         row = [f"{axis} [{unit}]", digits(scale * value)]
-        if published.rmse:
-            row.append(digits(scale * published.rmse[axis]) if axis in published.rmse else "")
+        if published:
+            row.append(digits(scale * published[axis]) if axis in published else "")
         table.add_row(*row)
     console.print(table)
 

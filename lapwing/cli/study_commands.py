@@ -134,8 +134,8 @@ def accuracy(
 ) -> None:
     """Measure error against CPU time of every integrator.
 
-    The first line is the cheapest one that meets the target, by evaluations. The subject is a reference problem with a
-    known solution, or the plant of a scene.
+    The first line is the one that meets the target with the fewest evaluations. The subject is a reference problem with
+    a known solution, or a scene: the table has its plant in the air, the first line what its flight needs.
     """
     from lapwing.cli.progress import step_progress
     from lapwing.views.studies import accuracy_command

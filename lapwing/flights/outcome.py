@@ -10,11 +10,8 @@ from lapwing.cosim.config.provenance import ENDED
 from lapwing.flights.contacts import BOUNCE, HARD, Touch
 from lapwing.flights.mission import Mission
 from lapwing.flights.topic_view import TopicView
+from lapwing.services.common.schemas.success_criteria import Kind
 
-Kind = Literal[
-    "landed", "completed", "landed elsewhere", "ended in failsafe", "timed out", "aborted", "crashed", "diverged"
-]
-KINDS = get_args(Kind)  # from best to worst
 LANDED = ("landed", "landed elsewhere", "ended in failsafe")  # kinds of a vehicle at rest on its feet
 FAILED = ("crashed", "diverged")
 NEVER_LEFT = "never left the ground"

@@ -18,7 +18,7 @@ COMMANDS = {  # run here, in this order, in one folder
     " --set run.duration=1",
     "campaign": "campaign hover --set run.duration=0.2 --runs 4 --seed 2 --vary vehicle.mass=normal(10.4,0.1)"
     " --design lhs --out c --csv --json c.json --report c.html --workers 1",
-    "sweep": "campaign hover --set run.duration=0.2 --sweep sweep.csv --out d --ci-half-width 0.9 --workers 1",
+    "sweep": "campaign hover --set run.duration=0.2 --sweep sweep.csv --out d --ci-half-width 0.49 --workers 1",
     "shard": "campaign hover --set run.duration=0.2 --runs 4 --seed 2 --out e --shard 1/1 --workers 1",
     "run of a campaign": "run hover --run 1 --campaign c --mode single-process --log r.mcap",
     "compare": "compare c e --json compare.json",

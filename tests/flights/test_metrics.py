@@ -6,9 +6,8 @@ import synthetic_flights
 
 from lapwing.cosim.scene import SceneError
 from lapwing.flights.metrics import METRICS, check_success, metrics
-from lapwing.flights.outcome import KINDS
 from lapwing.flights.tracking import AXES, Reference, reach, rmse, roll_pitch_yaw, strided_view, total
-from lapwing.services.common.schemas.success_criteria import Success, holds
+from lapwing.services.common.schemas.success_criteria import KINDS, Success, holds
 from lapwing.services.scene_resolver import load
 
 N = 400

@@ -30,6 +30,10 @@ BAD = {
     "no number": ([HOVER, "--run", "abc"], "--run abc: expected a valid integer (see lapwing run --help)"),
     "list": ([HOVER, "--set", 'success.require="time"'], "--set success.require: expected a list, got 'time'"),
     "success": ([HOVER, "--set", 'success.require=["tim < 3"]'], "unknown metric 'tim'; did you mean time?"),
+    "no outcome": (
+        [HOVER, "--set", "success.require=[\"outcome == 'landde'\"]"],
+        "'landde' is not an outcome; did you mean landed?",
+    ),
     "no condition": ([HOVER, "--set", 'success.require=["rmse.z"]'], "'rmse.z' is a number, not true or false"),
     "text without quotes": (
         [HOVER, "--set", 'success.require=["outcome == landed"]'],

@@ -7,6 +7,8 @@ import pytest
 import synthetic_flights
 
 from lapwing.flights.flight_events import Event, with_crash
+from lapwing.services.common.schemas.run_schema import published_figures
+from lapwing.services.scene_resolver import load
 from lapwing.views.report import write
 from lapwing.views.report.key_numbers import key_numbers, trouble
 from lapwing.views.report.sections import labels
@@ -152,3 +154,8 @@ def test_click_on_event_moves_plots(tmp_path):
         assert browser.errors == []
     assert ranges == pytest.approx([-3.0, 12.0])  # 5 s before the fault at 2 s to 10 s after it
     assert re.search(r'data-time="2.0"', page.read_text(encoding="utf-8"))
+
+
+def test_published_values_stand_beside_the_errors_of_their_airframe_only():
+    assert published_figures(load("delivery_mission").resolved)["source"] == "paper, Table 7"
+    assert not published_figures(load("delivery_mission", ["vehicle.airframe=racer_250"]).resolved)

@@ -51,15 +51,24 @@ def overrides(scene: Scene, notify: Callable[[str], None]) -> list[str]:
     accuracy = accuracy_to_select_for(scene)
     if accuracy is None:
         return []
-    try:
-        method, step = _for_own_flight(scene, accuracy, notify) or _for_manoeuvres(scene, accuracy, notify)
-    except ConfigError as error:
-        message = f"{accuracy:g}: {error.message}"
-        raise SceneError("solver.accuracy", message, source=KeyOrigin(scene.path)) from None
+    method, step = select(scene, accuracy, notify)
     # exact step that `Solver.check` accepts as a divisor of the communication step
     chosen = [f'solver.integrator="{method}"', f"solver.step={step!r}"]
     _warn_of_neighbours(scene, chosen, accuracy, notify)
     return chosen
+
+
+def select(scene: Scene, accuracy: float, notify: Callable[[str], None]) -> tuple[str, float]:
+    """Return (integrator, step [s]) that meets the accuracy in the scene at the lowest cost.
+
+    Raises:
+        SceneError: no integrator meets the accuracy on this plant.
+    """
+    try:
+        return _for_own_flight(scene, accuracy, notify) or _for_manoeuvres(scene, accuracy, notify)
+    except ConfigError as error:
+        message = f"{accuracy:g}: {error.message}"
+        raise SceneError("solver.accuracy", message, source=KeyOrigin(scene.path)) from None
 
 
 def _for_own_flight(scene: Scene, accuracy: float, notify: Callable[[str], None]) -> tuple[str, float] | None:

@@ -6,9 +6,8 @@ from typing import Any
 
 from lapwing.flights.flight_data import FlightData
 from lapwing.flights.metrics import METRICS
-from lapwing.flights.outcome import KINDS
 from lapwing.flights.separation import nearest
-from lapwing.services.common.schemas.success_criteria import Success
+from lapwing.services.common.schemas.success_criteria import KINDS, Success
 
 NEAREST = "nearest"  # [m] least distance between two vehicles
 POSITIONS = ("touchdown.x", "touchdown.y")  # undefined for several vehicles

@@ -21,7 +21,7 @@ import numpy as np
 from lapwing.cosim.complete_file import complete_file
 from lapwing.cosim.output_lock import write_errors
 from lapwing.cosim.run_errors import RunFailed
-from lapwing.services.common.schemas.run_schema import Published
+from lapwing.services.common.schemas.run_schema import published_figures
 from lapwing.services.common.schemas.success_criteria import Success
 from lapwing.studies.campaign import run_table
 from lapwing.studies.campaign.distributions import parse
@@ -133,7 +133,7 @@ def manifest(plan: Plan, reference: Reference) -> dict[str, Any]:
         "vary": {key: str(distribution) for key, distribution in plan.vary},
         "sources": sources(plan),
         "vehicles": vehicles(plan),
-        "published": {} if scene.vehicles else scene[Published].resolved(),
+        "published": {} if scene.vehicles else published_figures(scene.resolved),
         "success": list(dict.fromkeys(text for each in scene.each_vehicle for text in each[Success].require)),
         **reference._asdict(),
     }
@@ -155,7 +155,12 @@ def begin(path: Path, plan: Plan, about: dict[str, Any]) -> Folder:
     if not (path / MANIFEST).exists():
         _create(path, about)
     existing = read(path).about  # another machine may have started the campaign
-    differing = [name for name in about if name != "path" and existing.get(name) != about[name]]
+    compared = about.keys() - {"path", "sources", "end_state"}
+    differing = [name for name in about if name in compared and existing.get(name) != about[name]]
+    before, now = existing.get("sources", {}), about["sources"]
+    differing += [name for name in {**before, **now} if before.get(name) != now.get(name)]
+    if not differing and existing.get("end_state") != about["end_state"]:
+        differing = [f"final state of run {about['run']}"]
     if differing:
         raise ValueError(
             f"{path}: contains another campaign (differences: {', '.join(differing)}); expected a new folder"

@@ -7,8 +7,9 @@ from typing import Any
 import numpy as np
 
 from lapwing.flights.metrics import METRICS
-from lapwing.flights.outcome import FAILED, KINDS
+from lapwing.flights.outcome import FAILED
 from lapwing.flights.tracking import AXES
+from lapwing.services.common.schemas.success_criteria import KINDS
 from lapwing.studies.campaign.fleet_columns import NEAREST
 from lapwing.studies.campaign.folder import Folder
 from lapwing.studies.campaign.runs import REJECTED

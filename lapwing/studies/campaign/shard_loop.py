@@ -5,7 +5,7 @@ from collections.abc import Callable, Iterable, Mapping
 from types import MappingProxyType
 from typing import NamedTuple
 
-from lapwing.flights.outcome import KINDS
+from lapwing.services.common.schemas.success_criteria import KINDS
 from lapwing.studies.campaign.folder import Folder
 from lapwing.studies.campaign.runs import REJECTED, Reference, Row, fly_runs
 from lapwing.studies.campaign.statistics import Interval, interval

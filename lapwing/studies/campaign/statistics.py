@@ -66,12 +66,20 @@ def paired_difference(a: np.ndarray, b: np.ndarray) -> Interval:
     return Interval(mean, mean - half_width, mean + half_width)
 
 
-def rank_correlation(x: np.ndarray, y: np.ndarray) -> Interval:
-    """Return Spearman's correlation of two columns (n,), with the interval of Fisher's transformation."""
+def _deviations(tests: int) -> float:
+    """Return the half-width of a normal interval in standard deviations, if all of `tests` intervals are to hold."""
+    return float(stats.norm.ppf(1.0 - 0.5 * (1.0 - CONFIDENCE) / tests))
+
+
+def rank_correlation(x: np.ndarray, y: np.ndarray, tests: int = 1) -> Interval:
+    """Return Spearman's correlation of two columns (n,), with the interval of Fisher's transformation.
+
+    The intervals of `tests` parameters hold together (Bonferroni); so do those of `variance_share`.
+    """
     if len(x) < 4 or np.ptp(x) == 0.0 or np.ptp(y) == 0.0:
         return Interval(float("nan"), float("nan"), float("nan"))
     rho = float(stats.spearmanr(x, y).statistic)
-    half_width = float(stats.norm.ppf(0.5 + 0.5 * CONFIDENCE)) * np.sqrt((1.0 + 0.5 * rho * rho) / (len(x) - 3.0))
+    half_width = _deviations(tests) * np.sqrt((1.0 + 0.5 * rho * rho) / (len(x) - 3.0))
     z = np.arctanh(np.clip(rho, -1.0 + 1e-12, 1.0 - 1e-12))
     return Interval(rho, float(np.tanh(z - half_width)), float(np.tanh(z + half_width)))
 
@@ -88,7 +96,7 @@ def groups(x: np.ndarray, count: int) -> np.ndarray:
     return np.unique(np.searchsorted(edges[1:-1], x, side="right"), return_inverse=True)[1]
 
 
-def variance_share(x: np.ndarray, y: np.ndarray) -> Interval:
+def variance_share(x: np.ndarray, y: np.ndarray, tests: int = 1) -> Interval:
     """Return the share of the variance of y (n,) that the parameter x (n,) explains alone: its first-order Sobol index.
 
     Means of y in groups of x, without what chance contributes: epsilon squared of Kelley, "An unbiased correlation
@@ -111,7 +119,7 @@ def variance_share(x: np.ndarray, y: np.ndarray) -> Interval:
 
     random = np.random.default_rng(1)
     value, deviation = share(np.arange(n)), np.nanstd([share(random.integers(0, n, n)) for _ in range(RESAMPLES)])
-    half_width = float(stats.norm.ppf(0.5 + 0.5 * CONFIDENCE) * deviation)
+    half_width = _deviations(tests) * float(deviation)
     return Interval(value, value - half_width, value + half_width)
 
 

@@ -68,10 +68,10 @@ def drivers(results: Results, metric: str) -> list[Driver]:
     subset = finite[random_subset(len(finite), MAX_RUNS)]
     with_shares = len(subset) >= MIN_RUNS and not results.folder.plan.sweep  # parameters of a sweep may be dependent
     result = []
-    for key in varied_parameters(results):
+    for key in (keys := varied_parameters(results)):
         x = results.number(key)
-        share = variance_share(x[subset], y[subset]) if with_shares else Interval(np.nan, np.nan, np.nan)
-        result.append(Driver(key, rank_correlation(x[finite], y[finite]), share))
+        share = variance_share(x[subset], y[subset], len(keys)) if with_shares else Interval(np.nan, np.nan, np.nan)
+        result.append(Driver(key, rank_correlation(x[finite], y[finite], len(keys)), share))
     return sorted(result, key=lambda driver: -driver.strength)
 
 

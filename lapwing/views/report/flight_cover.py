@@ -3,6 +3,7 @@
 from collections.abc import Sequence
 
 from lapwing.flights.flight_data import FlightData
+from lapwing.services.common.schemas.run_schema import published_figures
 from lapwing.views.report.flight_header import MANY, cut, differences, facts
 from lapwing.views.report.key_numbers import KeyNumber, key_numbers
 from lapwing.views.report.page import accuracy
@@ -13,7 +14,7 @@ from lapwing.views.report.sections import labels
 def cover(flights: Sequence[FlightData]) -> Cover:
     """Return title, outcomes, table of errors and facts of one flight or of two, with the keys that differ."""
     scenes = [flight.origin.scene for flight in flights]
-    names, published = labels(flights), scenes[0].get("published", {})
+    names, published = labels(flights), published_figures(scenes[0])
     many = len(flights) > 1
     columns = ["RMSE", *(names if many else ["this flight"])]
     if published.get("rmse"):

@@ -11,6 +11,7 @@ from lapwing.flights.contacts import HARD
 from lapwing.flights.flight_data import FlightData
 from lapwing.flights.flight_events import Event
 from lapwing.flights.outcome import LANDING_RADIUS, Mark
+from lapwing.services.common.schemas.run_schema import published_figures
 
 TROUBLE = ("crash", "failsafe", "fault", "warning", "battery", "slack")  # kinds of events at the top of a report
 
@@ -54,12 +55,13 @@ class KeyNumber(NamedTuple):
 def key_numbers(flight: FlightData) -> list[KeyNumber]:
     """Return up to five numbers: errors, touch-down, distance from the target, battery or energy."""
     numbers, outcome = [], flight.outcome
-    published = flight.origin.scene.get("published", {}).get("rmse", {})
+    figures = published_figures(flight.origin.scene)
+    published = figures.get("rmse", {})
     if flight.rmse:
         axes = ("x", "y", "z")
         limit = float(np.linalg.norm([published[a] for a in axes])) if set(axes) <= set(published) else None
         rmse = float(np.linalg.norm([flight.rmse[axis] for axis in axes]))
-        source = flight.origin.scene.get("published", {}).get("source", "published") if limit else ""
+        source = figures.get("source", "published") if limit else ""
         numbers.append(KeyNumber("position error, RMS", rmse, "m", limit, source))
         numbers.append(KeyNumber("largest distance from reference", float(flight.reach[0]), "m"))
     if outcome.touchdown > 0.0:

@@ -11,6 +11,7 @@ from lapwing.flights.flight_data import FlightData
 from lapwing.flights.flight_topics import AXES
 from lapwing.flights.metrics import own_criteria
 from lapwing.flights.tracking import digits, unit_and_factor
+from lapwing.services.common.schemas.run_schema import published_figures
 from lapwing.views.report.flight_header import MANY, differences, facts
 from lapwing.views.report.key_numbers import key_numbers, trouble
 from lapwing.views.report.plotly_script import gzip_base64, remove_unused_traces, script
@@ -37,7 +38,7 @@ class Accuracy(NamedTuple):
 def flight_page(flights: Sequence[FlightData], view3d: bool = False) -> str:
     """Return the page of one flight, or of an overlay of two, with the 3D view if `view3d`."""
     scenes = [flight.origin.scene for flight in flights]
-    published = scenes[0].get("published", {})
+    published = published_figures(scenes[0])
     names, own = labels(flights), [own_criteria(flight) for flight in flights]
     tables = [facts(flight) for flight in flights]
     others = flights[0].others if len(flights) == 1 else ()

@@ -89,7 +89,8 @@ def _shared_labels(plot: Plot) -> dict[str, str]:
     result = {}
     for i, panel in enumerate(plot.panels):
         number = "" if i == 0 else str(i + 1)
-        row = [other.y_label for other in plot.panels if other.row == panel.row and other.y_label]
+        left = [other for other in plot.panels if other.row == panel.row and other.column < panel.column]
+        row = [other.y_label for other in left if other.y_label]
         column = [o.x_label for o in plot.panels if o.column == panel.column and not o.timed and o.x_label]
         if not panel.y_label and row:
             result[f"yaxis{number}"] = text_of(row[0])

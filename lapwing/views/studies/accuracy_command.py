@@ -1,16 +1,21 @@
 """`lapwing accuracy`: study of a target, with printed, written and plotted results."""
 
+import math
 from collections.abc import Callable
+from contextlib import nullcontext, suppress
 from pathlib import Path
 from typing import NamedTuple
 
 from rich.box import SIMPLE
 from rich.console import Console
 
+from lapwing.cosim.scene import Scene
+from lapwing.dynamics.config_error import ConfigError
 from lapwing.kernels import statistics
 from lapwing.services.plant.schema import Solver
+from lapwing.services.scene_resolver import load
 from lapwing.studies import json_file
-from lapwing.studies.accuracy import error_budget, round_off, scenes
+from lapwing.studies.accuracy import error_budget, round_off, scenes, solver_selection
 from lapwing.studies.accuracy.error_budget import ErrorSource
 from lapwing.studies.accuracy.problem import Problem
 from lapwing.studies.accuracy.round_off import RoundOff
@@ -39,7 +44,9 @@ class Study(NamedTuple):
     problem: Problem
     points: list[Point]
     goal: float  # error for which a solver is selected
-    selected: Point | None  # cheapest point that meets the goal; None if none does
+    selected: (
+        Point | None
+    )  # point that meets the goal with the fewest evaluations, in a scene's flight; None if none does
     parts: list[ErrorSource]  # error sources of a scene's flight
     largest: ErrorSource | None  # the largest of them with the scene's communication
     rounding: RoundOff | None  # None for a problem without steps in extended precision
@@ -57,7 +64,7 @@ def study(
     Args:
         target: name of a problem, or path of a scene.
         overrides: "key=value" of the scene.
-        goal: error for which the cheapest solver is selected; None: that of the scene, or `GOAL`.
+        goal: error for which a solver is selected; None: that of the scene, or `GOAL`.
         progress: called with the current part, and the numbers of finished and of all parts.
 
     Raises:
@@ -68,20 +75,35 @@ def study(
     problem = scenes.problem(scene.each_vehicle[0]) if scene else find(target)
     compiled, methods = statistics().compiled, len(problem.methods)
 
-    def say(name: str, done: int) -> None:
+    def say(name: str, done: int = methods) -> None:
         once = "compiling (once) and " if statistics().compiled > compiled else ""
         progress(f"{once}measuring {name}", done, methods + 2)
 
-    points = measure(problem, progress=say)
     asked = goal or (scene and scene.each_vehicle[0][Solver].accuracy) or GOAL
-    reached = goal is not None or any(p.error <= asked for p in points)
-    selected = cheapest(points, asked) if reached else None
+    points = measure(problem, progress=say)
+    selected = None
+    with nullcontext() if goal else suppress(ConfigError):
+        selected = _of_flight(scene, overrides, asked, points, say) if scene else cheapest(points, asked)
     say("error sources of the flight", methods)
     parts = error_budget.errors(scene) if scene else []
     cost = costs(scene, [tables_of(scene)])[0][:2] if scene and error_budget.has_contact(scene) else None
     say("round-off", methods + 1)
     largest = error_budget.largest(scene, parts) if scene else None
     return Study(target, problem, points, asked, selected, parts, largest, round_off.measure(problem), cost)
+
+
+def _of_flight(
+    scene: Scene, overrides: list[str], accuracy: float, points: list[Point], say: Callable[[str], None]
+) -> Point:
+    """Return the point that `solver.accuracy` selects for a scene's flight; without error and time if not measured.
+
+    Raises:
+        SceneError: no integrator meets the accuracy.
+    """
+    flown = load(scene.path, [*overrides, f"solver={{accuracy={accuracy!r}}}"])
+    method, step = solver_selection.select(flown, accuracy, lambda _: say("the flight with each integrator"))
+    same = (p for p in points if p.method == method and math.isclose(p.setting, step))
+    return next(same, Point(method, 0, "s", step, math.nan, math.nan, None, {}))
 
 
 def show(screen: Console, study: Study) -> None:
@@ -130,11 +152,18 @@ def setting(point: Point, unit: str) -> str:
 
 
 def answer(study: Study) -> str:
-    """Return the cheapest solver for the goal with its cost, and the price of a stricter goal, as one line."""
+    """Return the solver for the goal with its cost, and for a problem the price of a stricter goal, as one line."""
     problem, point = study.problem, study.selected
     if point is None:
         return f"{study.goal:g}: no method meets this error{smallest_error(study.points)}"
     cost = f"{1e3 * point.time:.3g} ms of CPU time for {problem.duration:g} {problem.unit}"
+    if study.parts:
+        cost = "" if math.isnan(point.time) else f" ({cost} in the air)"
+        return (
+            f"{study.goal:g}: {point.method} at {setting(point, 's')} in the flight, as solver.accuracy selects{cost}"
+        )
+    if point.evaluations is not None:
+        cost += f", {point.evaluations} evaluations, the fewest"
     finer = [p for p in study.points if p.error <= STRICTER * study.goal]
     if not finer:
         price = "no method is ten times more accurate"
@@ -142,10 +171,12 @@ def answer(study: Study) -> str:
         price = _price(cheapest(finer, study.goal).time / point.time)
     else:
         price = _price(cheapest(finer, study.goal).work[0] / point.evaluations)
-        cost += f", {point.evaluations} evaluations"
-    return (
-        f"{study.goal:g}: {point.method} at {setting(point, problem.unit)} (error {point.error:.1e}), {cost}; {price}"
-    )
+    solver = f"{point.method} at {setting(point, problem.unit)}"
+    fast = min((p for p in study.points if p.error <= study.goal), key=lambda p: p.time)
+    if fast.spread[1] < point.spread[0]:
+        less = f"{100.0 * (1.0 - fast.time / point.time):.0f} % less time"
+        cost += f"; {fast.method} at {setting(fast, problem.unit)} took {less}"
+    return f"{study.goal:g}: {solver} (error {point.error:.1e}), {cost}; {price}"
 
 
 def _price(ratio: float) -> str:
@@ -155,7 +186,8 @@ def _price(ratio: float) -> str:
 
 def show_points(console: Console, problem: Problem, points: list[Point], rounding: RoundOff | None = None) -> None:
     """Print the cheapest points of each method at a few errors, and the round-off error."""
-    console.print(f"{problem.title}, {problem.duration:g} {problem.unit}; reference: {problem.source}", highlight=False)
+    title = f"{problem.title}, {problem.duration:g} {problem.unit}"
+    console.print(f"{title}; errors at its end, relative to 1 + size; reference: {problem.source}", highlight=False)
     drifts = ["drift of\n" + name.replace(" ", "\n") for name in _drifts(points)]
     heads = ("method (order)\n    step", "error", "CPU\n[ms]", "evaluations", *drifts)
     rows = table(*heads, box=None, pad_edge=False, collapse_padding=True)

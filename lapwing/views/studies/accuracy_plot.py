@@ -31,15 +31,23 @@ def draw(
     with plot_style():
         figure = Figure(figsize=(13.0 if parts else 8.0, 5.2), layout="constrained")
         axes = figure.subplots(1, 2 if parts else 1, squeeze=False, width_ratios=(1.6, 1.0) if parts else None)[0]
-        draw_points(axes[0], points, goal, selected)
+        draw_points(axes[0], points, goal, selected, "solver.accuracy" if parts else "fewest evaluations")
         axes[0].set_title(title)
         if parts:
             draw_error_sources(axes[1], parts)
         figure.savefig(path, dpi=DPI)
 
 
-def draw_points(axes: Axes, points: list[Point], goal: float | None, selected: Point | None) -> None:
-    """Plot each method from coarse to fine, with the quartiles of the times, the target, and the selected point."""
+def draw_points(axes: Axes, points: list[Point], goal: float | None, selected: Point | None, why: str = "") -> None:
+    """Plot each method from coarse to fine, with the quartiles of the times, the target, and the selected point.
+
+    Args:
+        axes: of the plot.
+        points: all points.
+        goal: the target.
+        selected: point to mark.
+        why: reason of its selection, beside its name.
+    """
     curves = {name: _curve(points, name) for name in dict.fromkeys(p.method for p in points)}
     labelled = _cheapest_methods(points, goal, selected)
     for name, curve in curves.items():
@@ -66,7 +74,8 @@ def draw_points(axes: Axes, points: list[Point], goal: float | None, selected: P
         axes.plot(*spot, "o", markersize=13, markerfacecolor="none", markeredgecolor=TEXT, zorder=4)
     if len(labelled) < len(curves):
         axes.text(0.01, 0.02, "grey: other methods", transform=axes.transAxes, fontsize=9.5, color="#555555")
-    _label(axes, {name: curves[name] for name in labelled}, selected)
+    names = {name: f"{name}, {why}" if selected and name == selected.method else name for name in labelled}
+    _label(axes, {names[name]: curves[name] for name in labelled})
 
 
 def _curve(points: list[Point], name: str) -> np.ndarray:
@@ -91,7 +100,7 @@ def _cheapest_methods(points: list[Point], goal: float | None, selected: Point |
     return list(dict.fromkeys([*chosen, *front, *near]))[: len(COLOURS)]
 
 
-def _label(axes: Axes, curves: dict[str, np.ndarray], selected: Point | None) -> None:
+def _label(axes: Axes, curves: dict[str, np.ndarray]) -> None:
     """Write the names of the curves at the right edge, each with a line to the end of its curve."""
     low, high = np.log10(axes.get_ylim())
     ends = {name: (float(curve[0, -1]), float(curve[1, -1])) for name, curve in curves.items() if curve.size}
@@ -99,9 +108,8 @@ def _label(axes: Axes, curves: dict[str, np.ndarray], selected: Point | None) ->
     upper = 1.0 + LABEL
     for below, (number, name) in enumerate(sorted(enumerate(ends), key=lambda item: -height[item[1]]), 1 - len(ends)):
         upper = max(min(height[name], upper - LABEL), -LABEL * below)
-        text = f"{name}, chosen" if selected is not None and selected.method == name else name
         axes.annotate(
-            text, ends[name], xytext=(1.03, upper), textcoords="axes fraction", va="center", fontsize=9.5,
+            name, ends[name], xytext=(1.03, upper), textcoords="axes fraction", va="center", fontsize=9.5,
             color=COLOURS[number], arrowprops={"arrowstyle": "-", "color": COLOURS[number], "linewidth": 0.7},
         )  # fmt: skip
 

@@ -54,7 +54,7 @@ def criteria_plot(results: Results) -> Plot:
         if largest == 0.0:
             raise NotRecordedError("no run fails")
         return Plot((shares,), caption, 0.9 + 0.4 * len(bars))
-    caption += f" Right: share of runs with a smaller {metric}, which decides most failures or is nearest to its limit."
+    caption += f" Curve: share of runs with a smaller {metric}, which decides most failures or is nearest to its limit."
     (panel,) = _distributions(results, [metric], "").panels
     both = (shares, panel._replace(column=1, y_label="share of runs"))
     return Plot(both, caption, max(3.2, 0.9 + 0.4 * len(bars)), widths=(1.0, 1.0))
@@ -205,7 +205,7 @@ def sensitivity(results: Results) -> Plot:
         if independent
         else ". Shares of the variance need independent parameters, unlike those of a sweep."
     )
-    caption += " Grey: not distinguishable from 0, because the 95 % interval contains it."
+    caption += " Grey: not distinguishable from 0, because the interval contains it (95 % for all parameters together)."
     height = len(targets) * (1.1 + 0.26 * len(keys)) + 0.6
     return Plot(tuple(panels), caption, height, (1.0,) * len(targets), (1.0,) * len(kinds))
 

@@ -22,7 +22,11 @@ def result(study: Study) -> StudyResult:
     standing = _share(study.standing - study.smallest_standing, study.standing, study.noise[1]) or "nothing"
     steps = f"plant step of all {len(study.vehicles)} vehicles" if fleet else "plant step"
     rows = [(active, row) for active in (True, False) for row in _sorted_rows(study, active)]
-    notes = ['Costs after "<" are below the resolution of the measurement.']
+    notes = [
+        "Path: largest distance from the flight of the scene at equal times. End: distance of the final positions. "
+        "Share: of the step hovering.",
+        'Costs after "<" are below the resolution of the measurement.',
+    ]
     for vehicle in study.vehicles if fleet else ():
         for active in (True, False):
             names = [r.name for a, r in rows if a == active and r.influence and r.influence.vehicle == vehicle]

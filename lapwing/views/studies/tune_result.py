@@ -31,6 +31,8 @@ UNITS = {
     "lag": "s",
 }
 
+WORDS = {"spin_up_zero": "spin-up over drag torque", "lag": "lag of the rotors"}
+
 _MARGINS = (
     "Roll and pitch loops follow a tilt, position loops set it; with each other, both are cut at the motors at once. "
     "Crossover: highest frequency at which the loop's gain is 1; the loop follows slower motion. Phase margin: extra "
@@ -43,7 +45,7 @@ _ERRORS = (
 _CORNERS = "The true mass, inertia and thrust differ from the controller's by these shares, all at once."
 _MODEL = (
     "Acceleration per force that the controller demands of every rotor. Lag: time constant of the rotors' speed. "
-    "Spin-up zero: torque that spins a rotor up, over that of its drag, per unit rate of its speed."
+    "Spin-up over drag torque: torque that spins a rotor up, over that of its drag, per unit rate of its speed."
 )
 _GAINS = (
     "P acts on the error, I on its integral, D on its rate. Altitude, yaw and inner loops output a force per rotor "
@@ -124,7 +126,7 @@ def _model(tuning: Tuning) -> Rows:
     if tuning.identification is None:
         rows = Rows("Plant about hover, from the compiled model", "effect", "value", "unit", caption=_MODEL)
         for name, unit in UNITS.items():
-            rows.add(name, f"{getattr(tuning.compiled_model, name):.4g}", unit)
+            rows.add(WORDS.get(name, name), f"{getattr(tuning.compiled_model, name):.4g}", unit)
         return rows
     rows = Rows(
         "Plant about hover, identified from the log", "effect", "identified", "compiled model", "unit", "fit, %",
@@ -133,7 +135,7 @@ def _model(tuning: Tuning) -> Rows:
     for name, unit in UNITS.items():
         a, b = getattr(tuning.identification.model, name), getattr(tuning.compiled_model, name)
         fit = f"{tuning.identification.fit[name]:.1f}" if name in LOOPS else ""
-        rows.add(name, f"{a:.4g}", f"{b:.4g}", unit, fit)
+        rows.add(WORDS.get(name, name), f"{a:.4g}", f"{b:.4g}", unit, fit)
     return rows
 
 

@@ -1,8 +1,9 @@
 """Scene tables that several services read."""
 
 import importlib.resources
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Annotated, ClassVar, Literal
+from typing import Annotated, Any, ClassVar, Literal
 
 from pydantic import Field
 
@@ -57,7 +58,15 @@ class Published(SceneTable):
 
     TABLE: ClassVar[str] = "published"
     source: str = "published"  # origin of the figures
+    airframe: str = ""  # for which they hold; empty: any
     rmse: dict[Literal["x", "y", "z", "roll", "pitch", "yaw"], float] = Field(default_factory=dict)  # [m], [rad] error
+
+
+def published_figures(resolved: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the `[published]` table of a resolved scene; {} if it flies another airframe than that of the figures."""
+    figures = resolved.get(Published.TABLE, {})
+    airframe = figures.get("airframe", "")
+    return figures if airframe in ("", resolved.get("vehicle", {}).get("airframe")) else {}
 
 
 def follows_trajectory(scene: Scene) -> bool:

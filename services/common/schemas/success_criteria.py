@@ -5,12 +5,12 @@ import math
 from collections.abc import Mapping
 from functools import cache
 from types import CodeType
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
 from pydantic import Field
 
 from lapwing.cosim.scene import Scene, SceneTable
-from lapwing.dynamics.config_error import ConfigError
+from lapwing.dynamics.config_error import ConfigError, did_you_mean
 
 EXPECTED = "an expression over metrics of the flight such as \"rmse.x < 0.1 and outcome == 'landed'\""
 FUNCTIONS = {"abs": abs, "min": min, "max": max, "sqrt": math.sqrt}
@@ -22,6 +22,10 @@ _ALLOWED_NODES = (
     ast.BoolOp, ast.boolop, ast.Compare, ast.cmpop, ast.UnaryOp, ast.USub, ast.Not,
     ast.BinOp, ast.Add, ast.Sub, ast.Mult, ast.Div,
 )  # fmt: skip
+Kind = Literal[
+    "landed", "completed", "landed elsewhere", "ended in failsafe", "timed out", "aborted", "crashed", "diverged"
+]  # of an outcome
+KINDS = get_args(Kind)  # from best to worst
 TEXTS = frozenset({"outcome", "outcome_text"})  # metrics that are texts; all others are numbers
 NUMBER, TEXT, TRUTH, LIST = "a number", "a text", "true or false", "a list"
 
@@ -216,3 +220,5 @@ def _check_comparison(left: ast.expr, op: ast.cmpop, other: ast.expr) -> None:
             raise ValueError(f"{member.id!r} is a text without quotes")
         if kinds[0] != kinds[1]:
             raise ValueError(f"{ast.unparse(left)!r} is {kinds[0]}, {ast.unparse(member)!r} is {kinds[1]}")
+        if ast.unparse(left) == "outcome" and isinstance(member, ast.Constant) and member.value not in KINDS:
+            raise ValueError(f"{member.value!r} is not an outcome{did_you_mean(str(member.value), KINDS)}")

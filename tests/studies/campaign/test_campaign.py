@@ -110,6 +110,11 @@ def test_folder_of_other_campaign_is_rejected_unchanged(complete, tmp_path):
         with pytest.raises(ValueError, match=f"contains another campaign .*{differing}"):
             begin_campaign(folder.path, **changes)
     assert (folder.path / "campaign.json").read_text() == before
+    changed = folder.about | {"sources": folder.about["sources"] | {"a.toml": ""}, "end_state": "other"}
+    with pytest.raises(ValueError, match=r"\(differences: a.toml\)"):
+        begin(folder.path, folder.plan, changed)
+    with pytest.raises(ValueError, match=r"\(differences: final state of run 0\)"):
+        begin(folder.path, folder.plan, folder.about | {"end_state": "other"})
     (tmp_path / "notes.txt").write_text("mine")
     with pytest.raises(ValueError, match="contains other files"):
         begin_campaign(tmp_path)
@@ -341,7 +346,7 @@ def test_comparison_pairs_runs(complete, tmp_path):
         (["hover", "--sweep", "{}.csv"], "lapwing: --sweep: column vehicle.mas: unknown key 'mas'"),
         (["gyrostat_blocked"], "expected a scene whose autopilot follows a [trajectory]"),
         (["hover", "--report", "c.gif"], "--report c.gif: expected a name that ends in .html, .pdf or .png"),
-        (["hover", "--ci-half-width", "2"], "--ci-half-width 2: expected a probability between 0 and 1"),
+        (["hover", "--ci-half-width", "0.7"], "--ci-half-width 0.7: expected a probability above 0 and below 0.5"),
         (["hover", "--ci-half-width", "0.1", "--shard", "1/2"], "--ci-half-width: needs the results of all runs"),
         (["hover", "--workers", "2", "--cluster", "tcp://127.0.0.1:1"], "--workers: a cluster has its own"),
         (["hover", "--workers", "0"], "--workers 0: expected at least 1"),

@@ -56,6 +56,8 @@ def test_rank_correlation_of_monotone_and_independent_columns():
     assert rank_correlation(x, np.exp(5.0 * x)).value == pytest.approx(1.0)
     none = rank_correlation(x, np.random.default_rng(3).uniform(size=500))
     assert none.low < 0.0 < none.high
+    together = rank_correlation(x, np.random.default_rng(3).uniform(size=500), tests=5)
+    assert together.high - together.low == pytest.approx(2.5758 / 1.9600 * (none.high - none.low), rel=0.01)
     assert np.isnan(rank_correlation(x, np.ones(500)).value)
 
 
