@@ -28,6 +28,7 @@ from lapwing.views.studio.scene_forms import (
     command_line,
     form_changes,
     load_named,
+    merged,
     paths_and_warnings,
     posted_form,
     python,
@@ -210,6 +211,7 @@ class Pages:
         return self._page(
             "run.html",
             run=run,
+            changed=merged(run.changed),
             flight=summary,
             previous=others[0] if others else "",
             change_query=urlencode(query),
@@ -233,9 +235,10 @@ class Pages:
         name = request.path_params["name"]
         path = self._flights.path(name)
         code = f"import lapwing\n\nflight = lapwing.read_log({str(path)!r})\nprint(flight.outcome)\n"
-        return self._page(
-            "flight_page.html", flight=self._flights.summary(name), command=_report_command(path), python=code
-        )
+        flight = self._flights.summary(name)
+        scene = next((each for each in scene_files() if each.removesuffix(".toml") == flight.scene), "")
+        command = _report_command(path)
+        return self._page("flight_page.html", flight=flight, scene=scene, command=command, python=code)
 
     def report(self, request: Request) -> Response:
         """Return the report of a flight."""

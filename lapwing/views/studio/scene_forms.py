@@ -75,19 +75,19 @@ def changes(
 def command_line(scene: str, changed: Iterable[Change], speed: str, view: bool) -> list[str]:
     """Return the words of the command that runs a scene with these changes."""
     words = ["lapwing", "run", scene]
-    for change in _merged(changed):
+    for change in merged(changed):
         words += ["--set", change.override]
     return [*words, *(["--speed", speed] if speed else []), *(["--view"] if view else [])]
 
 
 def python(scene: str, changed: Iterable[Change]) -> str:
     """Return Python code that runs a scene with these changes."""
-    lines = [f"    {change.key!r}: {change.value!r},\n" for change in _merged(changed)]
+    lines = [f"    {change.key!r}: {change.value!r},\n" for change in merged(changed)]
     overrides = ", {\n" + "".join(lines) + "}" if lines else ""
     return f"import lapwing\n\nflight = lapwing.fly({scene!r}{overrides})\nprint(flight.outcome)\nflight.report()\n"
 
 
-def _merged(changed: Iterable[Change]) -> list[Change]:
+def merged(changed: Iterable[Change]) -> list[Change]:
     """Return changes that name an added table only where none of its keys is changed."""
     changes = list(changed)
     own = {change.key for change in changes}

@@ -207,6 +207,7 @@ def test_run_shows_outcome_command_and_report(studio, folder, flown):
         config = recorded_config(log)
     assert config.seed == 2
     assert config.resolved["trajectory"]["phase"][0]["z"][0]["to"] == 1.5
+    assert '/scenes/hover">Open the scene' in studio.page(f"flights/{logs(folder)[1]}")
     status, text, headers = studio.request(f"flights/{logs(folder)[1]}/report")
     assert status == 200
     assert "flight report" in text
