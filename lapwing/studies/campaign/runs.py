@@ -181,18 +181,23 @@ def scene_of(plan: Plan) -> Scene:
 
 
 def sources(plan: Plan) -> dict[str, str]:
-    """Return the source texts of a campaign: the scene, its files, and files that runs may name instead."""
+    """Return the source texts of a campaign: the scene, its files, and files that runs may name instead.
+
+    Raises:
+        ValueError: a value of a varied key is itself wrong, such as the name of a file that does not exist.
+    """
     result = {name: text.decode() for name, text in scene_of(plan).sources.items()}
     for key, distribution in plan.vary:
         for value in distribution.values:
             if isinstance(value, str):
-                with contextlib.suppress(SceneError):  # such a run is rejected
+                try:
                     sources_of_value = load(scene_of(plan), {key: value}).sources
-                    result |= {
-                        f"{key}={value}: {n}": t.decode()
-                        for n, t in sources_of_value.items()
-                        if result.get(n) != t.decode()
-                    }
+                except SceneError as error:
+                    if error.key == key:
+                        raise ValueError(str(error).replace("override", "--vary", 1)) from None
+                    continue  # another varied key may make it valid; if not, the run is rejected
+                texts = {name: text.decode() for name, text in sources_of_value.items()}
+                result |= {f"{key}={value}: {n}": t for n, t in texts.items() if result.get(n) != t}
     return dict(sorted(result.items()))
 
 

@@ -225,6 +225,14 @@ def test_interval_is_computed_once_per_shard(monkeypatch):
     assert requested == list(range(10, 3010, 10))
 
 
+def test_value_that_no_run_can_have_is_refused_before_the_first_flight(tmp_path):
+    own = ("--runs", "4", "--vary", "sensors.gps.preset=choice(rtk,standardd)", "--out", "c")
+    done = run_command("campaign", "hover", *own, folder=tmp_path, code=2)
+    text = "lapwing: --vary sensors.gps.preset: unknown preset 'standardd'; did you mean standard?"
+    assert text in done.stderr
+    assert not (tmp_path / "c").exists()
+
+
 def test_rejected_parameters_are_counted_and_listed(tmp_path):
     code, output = run_lapwing(*options(tmp_path / "c d", **{"vehicle.mass": choice(10.4, -1.0)}))
     assert code == 0
