@@ -12,6 +12,8 @@ import tokenize
 from functools import cache
 from types import ModuleType
 
+from lapwing.kernels import syntax_tree
+
 _UNITS = re.compile(r"\[[^\]]+\](, \[[^\]]+\])*")
 
 
@@ -31,7 +33,7 @@ def _in_module(module: ModuleType) -> dict[str, dict[str, str]]:
     tokens = tokenize.generate_tokens(io.StringIO(source).readline)
     lines = {t.start[0]: t.string.lstrip("# ") for t in tokens if t.type == tokenize.COMMENT}
     result: dict[str, dict[str, str]] = {}
-    for node in ast.parse(source).body:
+    for node in syntax_tree.parse(source).body:
         if isinstance(node, ast.ClassDef):
             fields = [f for f in node.body if isinstance(f, ast.AnnAssign) and isinstance(f.target, ast.Name)]
             result[node.name] = {f.target.id: lines[f.end_lineno] for f in fields if f.end_lineno in lines}  # type: ignore

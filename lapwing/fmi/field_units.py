@@ -7,6 +7,8 @@ from collections.abc import Mapping
 from functools import cache
 from typing import NamedTuple
 
+from lapwing.kernels import syntax_tree
+
 _UNIT = re.compile(r"^\s*(\w+)\s*:.*#\s*\[([^\]]+)\]")
 _BASE = ("kg", "m", "s", "A", "K", "rad")  # base units of FMI that occur
 _DERIVED: Mapping[str, tuple[float, Mapping[str, int]]] = {
@@ -72,7 +74,7 @@ def parse_unit(name: str) -> Unit | None:
     text = name.strip().replace("·", "*").replace("²", "^2").replace("³", "^3")
     text = re.sub(r"(?<=[\w)])\s+(?=[\w(])|(?<=[A-Za-z)])\.(?=[A-Za-z(])", "*", text).replace("^", "**")
     try:
-        tree = ast.parse(text, mode="eval")
+        tree = syntax_tree.parse(text, mode="eval")
         factor, powers = _evaluate(tree.body)
     except (SyntaxError, ValueError, KeyError):
         return None

@@ -11,6 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
+from lapwing.kernels import syntax_tree
 from lapwing.kernels.compiler import cache_files
 from lapwing.kernels.compiler.start_time import BEGAN
 
@@ -189,7 +190,7 @@ def imports(module: str, is_package: bool, source: bytes, version: str) -> list[
 
 def _imported_modules(source: bytes, package: str) -> set[str]:
     imports: set[str] = set()
-    for node in ast.walk(ast.parse(source)):
+    for node in ast.walk(syntax_tree.parse(source)):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 parts = alias.name.split(".")
