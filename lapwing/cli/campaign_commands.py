@@ -138,15 +138,14 @@ def campaign(
 
         results = Results(folder, key_units(campaign_plan.keys))
         found = result(results, digest)
-        show(screen, found)
         if json:
             write_json(json, found)
-        page = report or folder.path / "report.html"
-        if len(results) and (message := missing("jinja2", "plotly", "matplotlib")):
-            screen.print(f"report  none: {message}", markup=False, soft_wrap=True)
-        elif len(results):
+        page, lacking = report or folder.path / "report.html", missing("jinja2", "plotly", "matplotlib")
+        if len(results) and not lacking:
             write_report(page, found)
-            screen.print(f"{'report':<7} {page}", soft_wrap=True)
+        show(screen, found)  # after the files: a closed pipe, as of `head`, ends the command
+        if len(results):
+            screen.print(f"report  {f'none: {lacking}' if lacking else page}", soft_wrap=True)
         screen.print(f"{'digest':<7} {digest}\n{'folder':<7} {folder.path}", soft_wrap=True)
 
 
@@ -164,9 +163,9 @@ def compare(
 
     claim(json)
     result = comparison_result(study(one, other))
-    show(console(), result)
     if json:
         write_json(json, result)
+    show(console(), result)
 
 
 def _explain(folder: Path, run: int, json: Path | None) -> None:
@@ -181,9 +180,9 @@ def _explain(folder: Path, run: int, json: Path | None) -> None:
     claim(json)
     with step_progress(screen, "flights") as progress:
         result = explanation_result(explain(folder, run, progress))
-    show(screen, result)
     if json:
         write_json(json, result)
+    show(screen, result)
 
 
 def _reference(screen: "Console", campaign_plan: "Plan") -> "Reference":

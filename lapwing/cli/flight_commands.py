@@ -65,11 +65,12 @@ def validate(
         memory = TrimMemory(trim_force, trim_torque)
         found = procedure.validate(scene, flights, mapping, steps, set_ or [], memory, stride, closed_loop, say)
     result = validation_result(found)
-    show(console(), result)
     if json:
         write_json(json, result)
     if report:
         write_report(report, result)
+    show(console(), result)
+    if report:
         typer.echo(f"{report}: errors over the envelope and residual spectra")
 
 
@@ -127,13 +128,13 @@ def identify(
             scene, flights, mapping, keys, memory, set_ or [], windows, seed, progress, say, horizons=steps
         )
     page = identification_result(result)
-    show(console(), page)
     procedure.write_airframe(out, scene, result, set_ or [])
+    if json:
+        write_json(json, page)
+    show(console(), page)
     typer.echo(f"{out}: the airframe; its first lines contain the values for the scene")
     if procedure.joint_distribution(result.fit):
         typer.echo(f"lapwing campaign {scene} --vary {out}: flies vehicles that are as uncertain as the estimates")
-    if json:
-        write_json(json, page)
 
 
 def _is_on_command_line(context: typer.Context, name: str) -> bool:

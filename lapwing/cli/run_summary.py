@@ -185,10 +185,11 @@ def compare_with_campaign(options: RunOptions, flights: Sequence[Flight]) -> Non
 
 def check_success(scene: Scene, flights: Sequence[Flight]) -> None:
     """Exit with 4 if a flight does not meet success.require of the scene."""
-    for flight, vehicle in zip(flights, scene.each_vehicle, strict=False):
-        if shortfall := vehicle[Success].shortfall(metrics(flight)):
-            vehicle_text = f" of {flight.vehicle}" if scene.vehicles else ""
-            fail(
-                f"flight{vehicle_text} failed: {flight.outcome.kind}; success.require: {shortfall}",
-                FLIGHT_FAILED,
-            )
+    failures = [
+        f"flight{f' of {flight.vehicle}' if scene.vehicles else ''} failed: {flight.outcome.kind}; "
+        f"success.require: {shortfall}"
+        for flight, vehicle in zip(flights, scene.each_vehicle, strict=False)
+        if (shortfall := vehicle[Success].shortfall(metrics(flight)))
+    ]
+    if failures:
+        fail("; ".join(failures), FLIGHT_FAILED)

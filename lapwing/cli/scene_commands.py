@@ -61,11 +61,14 @@ def check(
 
     With --accuracy the exit code is 1 if the error of the solver is larger than solver.accuracy.
     """
+    from lapwing.cosim.diagram.multi_vehicle import members
     from lapwing.services.common import foreign_code
     from lapwing.services.common.schemas.communication_schema import Communication
     from lapwing.services.common.schemas.run_schema import Run
     from lapwing.services.common.schemas.vehicle_schema import Vehicle
     from lapwing.services.scene_resolver import resolve
+    from lapwing.services.trajectory.service import NAME as TRAJECTORY
+    from lapwing.services.trajectory.service import TrajectoryConfig
 
     with foreign_code.permission(allow_code):
         if json and not accuracy:
@@ -81,13 +84,16 @@ def check(
         typer.echo(f"{scene}: ok")
         check_gains(loaded, force=True)
         print_warnings(loaded, config)
-        for each in loaded.each_vehicle:
+        for each, member in zip(loaded.each_vehicle, members(config), strict=True):
             vehicle = each[Vehicle]
             lines += [
                 ("vehicle", f"{vehicle.name}, {vehicle.airframe or vehicle.model}"),
                 ("effects", ", ".join(sorted(each.tables("effects"))) or "none"),
                 ("sensors", ", ".join(sorted(each.tables("sensors"))) or "none"),
             ]
+            service = member.services.get(TRAJECTORY)
+            if service is not None and isinstance(service.parameters, TrajectoryConfig):
+                lines.append(("path", service.parameters.extent(member.duration)))
         lines.append(("services", f"{', '.join(config.order)}; {exchange.rate} Hz, {exchange.coupling}"))
         for label, line in lines:
             typer.echo(f"  {label:<9} {line}")
@@ -123,9 +129,9 @@ def _accuracy_met(result: "FlightAccuracy", json: Path | None) -> bool:
     from lapwing.views.studies import flight_accuracy_console as flight_accuracy_output
     from lapwing.views.terminal import console
 
-    flight_accuracy_output.show(console(), result)
     if json:
         flight_accuracy_output.write_json(json, result)
+    flight_accuracy_output.show(console(), result)
     return result.met
 
 

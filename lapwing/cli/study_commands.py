@@ -42,11 +42,11 @@ def _study(
     claim(json)
     claim_plot(plot)
     result = find()
-    module.show(console, result)
     if json:
         module.write_json(json, result)
     if plot:
         module.plot(plot, result)
+    module.show(console, result)  # last: a closed pipe, as of `head`, ends the command
 
 
 @app.command()
@@ -112,11 +112,11 @@ def effects(
 
     with StudyProgress(screen, "parts") as progress:
         result = effects_result.result(study(load(scene, set_ or []), tolerance, progress.say, names))
-    show(screen, result)
     if json:
         write_json(json, result)
     if plot:
         write_plot(plot, result)
+    show(screen, result)
 
 
 @app.command()
@@ -187,11 +187,11 @@ def stability(
             detail = f"{finished}; {stability_result.result(results).verdict}" if results else ""
             raise Interrupted(interrupted.signal, detail) from None
     page = stability_result.result(sorted(results, key=lambda each: names.index(each.case)))
-    show(screen, page)
     if json:
         write_json(json, page)
     if report:
         write_report(report, page)
+    show(screen, page)
     if page.mark == "bad":
         raise SystemExit(1)
 
@@ -255,12 +255,15 @@ def tune(
                 lambda: show("flying gain sets", next(numbers)),
             )
     page = tune_result.result(result)
-    show_result(screen, page)
+    lines = []
     if out and (force or not result.failures):
         procedure.write(out, result.gains)
-        typer.echo(f'{out}: use it with [autopilot] gains = "{out.name}"')
+        lines.append(f'{out}: use it with [autopilot] gains = "{out.name}"')
     if report:
         write_report(report, page)
-        typer.echo(f"{report}: Bode plots, margins and steps")
+        lines.append(f"{report}: Bode plots, margins and steps")
+    show_result(screen, page)
+    for line in lines:
+        typer.echo(line)
     if out and result.failures and not force:
         fail(f"{out}: not written, the gains fail {'; '.join(result.failures)}; use --force to write them", 1)

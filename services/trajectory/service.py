@@ -1,6 +1,7 @@
 """Trajectory service: outputs setpoints, up to a bounded time ahead of the plant."""
 
 from collections.abc import Iterator
+from itertools import pairwise
 from typing import Any, NamedTuple
 
 from lapwing.cosim.config.run_config import RunConfig
@@ -48,6 +49,13 @@ class TrajectoryConfig(NamedTuple):
                 x0, y0, z0 = _place(core.leader.path, time)
                 x, y, z = x0 + c * x - s * y, y0 + s * x + c * y, z0 + z
             yield time, self.phases[_last_not_after(own.phase_start, time)], x, y, z
+
+    def extent(self, duration: float) -> str:
+        """Return the number of phases, time and length of the path within `duration` [s], for a person."""
+        places = list(self.track(duration))
+        length = math.total(math.dist(a[2:], b[2:]) for a, b in pairwise(places))
+        number = len({phase for _, phase, *_ in places})
+        return f"{number} phase{'s' * (number > 1)}, {places[-1][0]:.0f} s, {length:.0f} m"
 
 
 def _place(path: Parameters, time: float) -> tuple[float, float, float]:

@@ -11,7 +11,7 @@ import pytest
 import lapwing
 from lapwing.cli.app import FIRST, GROUPS
 from lapwing.cosim.transport.bus_keys import check_key_prefix
-from tests.commands import assert_rejected
+from tests.commands import assert_rejected, run_command
 
 ROOT = Path.cwd()
 HOVER, DELIVERY = "scenes/hover.toml", "scenes/delivery_mission.toml"
@@ -221,6 +221,7 @@ def test_check_prints_configuration(lapwing):
         "  vehicle   drone1, delivery_drone",
         "  effects   gravity, ground_contact, rotor_thrust",
         "  sensors   none",
+        "  path      4 phases, 9 s, 2 m",
         "  services  plant, trajectory, autopilot; 250 Hz, gauss_seidel",
     ]
 
@@ -335,6 +336,12 @@ def test_closed_pipe_ends_command_quietly():
 
 
 @pytest.mark.skipif(not FULL.exists(), reason="there is no /dev/full")
+def test_study_writes_its_files_before_its_output(tmp_path):
+    script = '"$@" | true'  # ends before the study prints
+    run_command("performance", "hover", "--json", tmp_path / "card.json", within=("sh", "-c", script, "sh"))
+    assert (tmp_path / "card.json").exists()
+
+
 def test_exit_code_survives_closed_error_stream():
     with FULL.open("w") as full:
         result = subprocess.run([sys.executable, "-m", "lapwing", "nonsense"], stderr=full, check=False)
