@@ -12,7 +12,7 @@ import tokenize
 from functools import cache
 from types import ModuleType
 
-from lapwing.kernels import syntax_tree
+from lapwing import syntax_tree
 
 _UNITS = re.compile(r"\[[^\]]+\](, \[[^\]]+\])*")
 

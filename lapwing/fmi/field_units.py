@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import NamedTuple
 
-from lapwing.kernels import syntax_tree
+from lapwing import syntax_tree
 
 _UNIT = re.compile(r"^\s*(\w+)\s*:.*#\s*\[([^\]]+)\]")
 _BASE = ("kg", "m", "s", "A", "K", "rad")  # base units of FMI that occur

@@ -15,7 +15,7 @@ from lapwing.views.report.key_numbers import key_numbers
 from lapwing.views.report.page import flight_page
 
 HOVER = ["run", "hover", "--mode", "single-process", "--log", "a.mcap", "--json", "a.json"]
-FALL = 'trajectory.phase.2.z={kind="ramp", to=-12.0, rate=8.0}'
+FALL = 'trajectory.phase.2.z=[{kind="ramp", to=-12.0, rate=8.0}, {kind="ramp", to=0.0, rate=8.0}]'
 RUN_AWAY = ["gyrostat.cubic_gain=[-1e250, -1e250, -1e250]", "run.duration=1.0"]
 
 

@@ -201,7 +201,8 @@ def test_motors_stopped_at_maximum_height_are_cause_of_crash(lapwing):
 
 
 def test_flight_that_never_leaves_the_ground_is_not_good(lapwing):
-    low = 'trajectory.phase.0.z={kind="minimum_jerk", to=-0.1, duration=3.0}'
+    sink, rise = (f'{{kind="minimum_jerk", to={z}, duration={t}}}' for z, t in ((-0.1, 3.0), (0.0, 1.0)))
+    low = f"trajectory.phase.0.z=[{sink}, {rise}]"
     code, out, err = lapwing("run", "hover", *SINGLE, "--set", low, "--set", "run.duration=8.0")
     assert (code, "timed out" in err) == (4, True), (out, err)
     assert "never left the ground" in out

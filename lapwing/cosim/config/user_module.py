@@ -25,9 +25,10 @@ from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from types import ModuleType
 
+from lapwing import syntax_tree
 from lapwing.cosim.access.private_sockets import only_user_writable
 from lapwing.dynamics.config_error import ConfigError
-from lapwing.kernels import cache_folder, forget_sources, syntax_tree
+from lapwing.kernels import cache_folder, forget_sources
 
 
 def find(key: str, name: str, folder: Path) -> dict[str, Path]:

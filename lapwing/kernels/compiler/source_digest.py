@@ -11,7 +11,7 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from lapwing.kernels import syntax_tree
+from lapwing import syntax_tree
 from lapwing.kernels.compiler import cache_files
 from lapwing.kernels.compiler.start_time import BEGAN
 

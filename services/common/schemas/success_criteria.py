@@ -9,9 +9,9 @@ from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
 from pydantic import Field
 
+from lapwing import syntax_tree
 from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.config_error import ConfigError, did_you_mean
-from lapwing.kernels import syntax_tree
 
 EXPECTED = "an expression over metrics of the flight such as \"rmse.x < 0.1 and outcome == 'landed'\""
 FUNCTIONS = {"abs": abs, "min": min, "max": max, "sqrt": math.sqrt}

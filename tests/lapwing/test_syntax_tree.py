@@ -6,7 +6,7 @@ import inspect
 import time
 from concurrent.futures import ThreadPoolExecutor
 
-from lapwing.kernels import syntax_tree
+from lapwing import syntax_tree
 
 
 def test_threads_parse_at_once():
