@@ -44,9 +44,7 @@ class Study(NamedTuple):
     problem: Problem
     points: list[Point]
     goal: float  # error for which a solver is selected
-    selected: (
-        Point | None
-    )  # point that meets the goal with the fewest evaluations, in a scene's flight; None if none does
+    selected: Point | None  # meets the goal with the fewest evaluations, in a scene's flight; None if none does
     parts: list[ErrorSource]  # error sources of a scene's flight
     largest: ErrorSource | None  # the largest of them with the scene's communication
     rounding: RoundOff | None  # None for a problem without steps in extended precision
