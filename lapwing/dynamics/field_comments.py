@@ -12,7 +12,7 @@ import tokenize
 from functools import cache
 from types import ModuleType
 
-from lapwing import syntax_tree
+from lapwing.syntax_tree import parse
 
 _UNITS = re.compile(r"\[[^\]]+\](, \[[^\]]+\])*")
 
@@ -33,7 +33,7 @@ def _in_module(module: ModuleType) -> dict[str, dict[str, str]]:
     tokens = tokenize.generate_tokens(io.StringIO(source).readline)
     lines = {t.start[0]: t.string.lstrip("# ") for t in tokens if t.type == tokenize.COMMENT}
     result: dict[str, dict[str, str]] = {}
-    for node in syntax_tree.parse(source).body:
+    for node in parse(source).body:
         if isinstance(node, ast.ClassDef):
             fields = [f for f in node.body if isinstance(f, ast.AnnAssign) and isinstance(f.target, ast.Name)]
             result[node.name] = {f.target.id: lines[f.end_lineno] for f in fields if f.end_lineno in lines}  # type: ignore

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 from functools import cache
 from typing import NamedTuple
 
-from lapwing import syntax_tree
+from lapwing.syntax_tree import parse
 
 _UNIT = re.compile(r"^\s*(\w+)\s*:.*#\s*\[([^\]]+)\]")
 _BASE = ("kg", "m", "s", "A", "K", "rad")  # base units of FMI that occur
@@ -74,7 +74,7 @@ def parse_unit(name: str) -> Unit | None:
     text = name.strip().replace("·", "*").replace("²", "^2").replace("³", "^3")
     text = re.sub(r"(?<=[\w)])\s+(?=[\w(])|(?<=[A-Za-z)])\.(?=[A-Za-z(])", "*", text).replace("^", "**")
     try:
-        tree = syntax_tree.parse(text, mode="eval")
+        tree = parse(text, mode="eval")
         factor, powers = _evaluate(tree.body)
     except (SyntaxError, ValueError, KeyError):
         return None

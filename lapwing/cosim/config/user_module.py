@@ -25,10 +25,10 @@ from importlib.machinery import ModuleSpec, PathFinder
 from pathlib import Path
 from types import ModuleType
 
-from lapwing import syntax_tree
 from lapwing.cosim.access.private_sockets import only_user_writable
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.kernels import cache_folder, forget_sources
+from lapwing.syntax_tree import parse
 
 
 def find(key: str, name: str, folder: Path) -> dict[str, Path]:
@@ -92,7 +92,7 @@ def _imports(file: Path) -> list[str]:
     """Return the sorted top-level names that a source imports; an empty list if it is not Python."""
     result: set[str] = set()
     with suppress(SyntaxError, ValueError, OSError):
-        for node in ast.walk(syntax_tree.parse(file.read_bytes())):
+        for node in ast.walk(parse(file.read_bytes())):
             if isinstance(node, ast.Import):
                 result.update(alias.name.partition(".")[0] for alias in node.names)
             elif isinstance(node, ast.ImportFrom) and node.module and not node.level:

@@ -11,9 +11,9 @@ from functools import cache
 from pathlib import Path
 from typing import NamedTuple
 
-from lapwing import syntax_tree
 from lapwing.kernels.compiler import cache_files
 from lapwing.kernels.compiler.start_time import BEGAN
+from lapwing.syntax_tree import parse
 
 OURS = {"lapwing"}
 STANDARD = (sysconfig.get_path("stdlib"), sysconfig.get_path("platstdlib"))
@@ -190,7 +190,7 @@ def imports(module: str, is_package: bool, source: bytes, version: str) -> list[
 
 def _imported_modules(source: bytes, package: str) -> set[str]:
     imports: set[str] = set()
-    for node in ast.walk(syntax_tree.parse(source)):
+    for node in ast.walk(parse(source)):
         if isinstance(node, ast.Import):
             for alias in node.names:
                 parts = alias.name.split(".")

@@ -9,9 +9,9 @@ from typing import Any, ClassVar, Literal, NamedTuple, get_args
 
 from pydantic import Field
 
-from lapwing import syntax_tree
 from lapwing.cosim.scene import Scene, SceneTable
 from lapwing.dynamics.config_error import ConfigError, did_you_mean
+from lapwing.syntax_tree import parse
 
 EXPECTED = "an expression over metrics of the flight such as \"rmse.x < 0.1 and outcome == 'landed'\""
 FUNCTIONS = {"abs": abs, "min": min, "max": max, "sqrt": math.sqrt}
@@ -48,7 +48,7 @@ class Success(SceneTable):
                 excerpt = text if len(text) <= 80 else f"{text[:77]}..."
                 raise ConfigError(f"success.require.{i}", f"got {excerpt!r}", EXPECTED) from None
             try:
-                _check_types(syntax_tree.parse(text.strip(), mode="eval").body)
+                _check_types(parse(text.strip(), mode="eval").body)
                 _check_constants(text)
             except ValueError as error:
                 expected = 'a condition such as "rmse.x < 0.1"'
@@ -103,7 +103,7 @@ def _expression(text: str) -> _Expression:
     if len(text) > LONGEST:
         raise ValueError(text)
     try:
-        tree = syntax_tree.parse(text.strip(), mode="eval")
+        tree = parse(text.strip(), mode="eval")
     except (SyntaxError, RecursionError, MemoryError):
         raise ValueError(text) from None
     nodes = list(ast.walk(tree))
@@ -117,7 +117,7 @@ def _expression(text: str) -> _Expression:
 
 def _check_constants(text: str) -> None:
     """Raise ValueError if a part without metrics, such as 1 / 0, cannot be computed."""
-    tree = ast.fix_missing_locations(_Lookup().visit(syntax_tree.parse(text.strip(), mode="eval")))
+    tree = ast.fix_missing_locations(_Lookup().visit(parse(text.strip(), mode="eval")))
     for node in ast.walk(tree):
         if not isinstance(node, ast.expr) or any(isinstance(n, ast.Subscript | ast.Name) for n in _values(node)):
             continue
