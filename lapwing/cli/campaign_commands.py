@@ -178,7 +178,7 @@ def _explain(folder: Path, run: int, json: Path | None) -> None:
 
     screen = console()
     claim(json)
-    with step_progress(screen, "flights") as progress:
+    with step_progress(screen, "flights", announced=True) as progress:
         result = explanation_result(explain(folder, run, progress))
     if json:
         write_json(json, result)

@@ -21,7 +21,7 @@ class WindGust(NamedTuple):
 
     peak: tuple[Speed, Speed, Speed]  # [m/s] world
     start: Annotated[float, Ge(0)]  # [s] simulation time
-    duration: Annotated[float, Gt(0)]  # [s] duration
+    duration: Annotated[float, Gt(0)]  # [s] of 1 - cosine, with the peak in its middle
 
 
 FEWEST = 16.0  # steps in a gust

@@ -48,7 +48,7 @@ def facts(flight: FlightData) -> dict[str, str]:
 
 
 def differences(one: dict[str, Any], other: dict[str, Any]) -> dict[str, tuple[str, str]]:
-    """Return both values of the keys in which two scenes differ; the tables of a list have numbers from 1 as keys."""
+    """Return both values of the keys in which two scenes differ; the tables of a list have their index as key."""
     first, second = (_leaves_in_use(scene, uses_gains(one) and uses_gains(other)) for scene in (one, other))
     keys = [key for key in {**first, **second} if first.get(key) != second.get(key)]
     return {key: (cut(first.get(key, ""), LONGEST), cut(second.get(key, ""), LONGEST)) for key in keys}
@@ -58,7 +58,7 @@ def _leaves(table: dict[str, Any], prefix: str = "") -> Iterator[tuple[str, Any]
     """Yield dotted key and value of all leaves without empty lists; an effect or sensor without keys is "yes"."""
     for key, value in table.items():
         if isinstance(value, list | tuple) and value and all(isinstance(item, dict) for item in value):
-            value = {str(k): item for k, item in enumerate(value, 1)}
+            value = {str(k): item for k, item in enumerate(value)}
         if isinstance(value, dict) and value:
             yield from _leaves(value, f"{prefix}{key}.")
         elif isinstance(value, dict):

@@ -148,7 +148,7 @@ class Pages:
             if value == OFF and key.count(".") == 1 and key.startswith(SWITCHED):
                 texts[key] = value
             elif key in fields:
-                texts[key] = value[1:-1] if fields[key].kind in ("text", "choice") and value[:1] == '"' else value
+                texts[key] = value[1:-1] if fields[key].kind != "toml" and value[:1] == '"' else value
             else:
                 error = error or f"{text}: cannot be changed in this form; use lapwing run {name} --set"
         return self._page(

@@ -105,12 +105,15 @@ def _value(field: Field, text: str) -> Any:
     """Return the value of a text in the form. Raise ValueError if it does not fit the field's kind."""
     if field.kind == "text" or (field.kind == "choice" and not _is_word(text)):
         return text
-    if field.kind == "number" and units.parse(text, field.unit.replace("²", "^2").replace("³", "^3")) is not None:
+    unit = field.unit.replace("²", "^2").replace("³", "^3")
+    if field.kind == "number" and units.parse(text, unit) is not None:
         return text  # with a unit
     try:
         (value,) = tomllib.loads(f"value = {text}").values()
     except (ValueError, RecursionError):  # invalid TOML, or more than one value
-        expected = {"number": "a number", "integer": "a whole number"}.get(field.kind, "a TOML value, e.g. [1.0, 2.0]")
+        known = f", or one with {', '.join(units.UNITS[unit])}" if unit in units.UNITS else ""
+        number = {"number": f"a number{known}", "integer": "a whole number"}
+        expected = number.get(field.kind, "a TOML value, e.g. [1.0, 2.0]")
         raise ValueError(f"got {text[:60]}; expected {expected}") from None
     if field.kind == "integer" and type(value) is not int:
         raise ValueError(f"got {text[:60]}; expected a whole number")

@@ -52,9 +52,9 @@ def test_keys_in_which_two_scenes_differ():
     assert differences({"published": {"rmse": {"x": 1.0}}, "run": {"title": "a"}}, {"run": {"title": "b"}}) == {}
     one = {"box": [{"top": 3.0, "open": True}, {"top": 2.0}], "points": [[0.0, 1.5]]}
     assert differences(one, {}) == {
-        "box.1.top": ("3", ""),
-        "box.1.open": ("true", ""),
-        "box.2.top": ("2", ""),
+        "box.0.top": ("3", ""),
+        "box.0.open": ("true", ""),
+        "box.1.top": ("2", ""),
         "points": ("[[0, 1.5]]", ""),
     }
     assert len(differences({str(k): k for k in range(MANY + 3)}, {})) == MANY + 3

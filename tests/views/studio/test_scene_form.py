@@ -134,10 +134,10 @@ def test_texts_become_values_of_field(schema):
     ("key", "text", "message"),
     [
         ("run.seed", "1.5", "got 1.5; expected a whole number"),
-        ("run.duration", "long", "got long; expected a number"),
+        ("run.duration", "long", "got long; expected a number, or one with s, ms, min, h"),
         ("run.duration", "[1]", "got [1]; expected a number"),
         ("effects.random_wind_force.mean", "3, 1", "got 3, 1; expected a TOML value, e.g. [1.0, 2.0]"),
-        ("run.duration", "1\nx = 2", "got 1\nx = 2; expected a number"),
+        ("run.duration", "1\nx = 2", "got 1\nx = 2; expected a number, or one with s, ms, min, h"),
     ],
 )
 def test_text_of_wrong_type_is_fault(schema, key, text, message):

@@ -158,6 +158,12 @@ def test_preview_names_values_of_an_added_effect_once(studio):
     assert "wind_constant={velocity = [0.0, 0.0, 0.0]}" in preview(studio, "hover", added)["command"]
 
 
+def test_change_with_a_unit_returns_to_its_field(studio):
+    page = studio.page('scenes/hover?set=run.duration="90+s"')
+    assert re.search(r'<input[^>]+name="run.duration"[^>]+value="90 s"', page)
+    assert preview(studio, "hover", {"run.duration": "90 s"})["faults"] == {}
+
+
 def test_effect_or_sensor_is_switched_off(studio):
     page = studio.page("scenes/delivery_mission?set=effects.random_wind_force%3Dfalse")
     assert re.search(r'name="effects.random_wind_force" value="false" checked', page)
