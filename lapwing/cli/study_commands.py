@@ -12,6 +12,7 @@ from lapwing.cli.app import app
 from lapwing.cli.error_exit import fail
 from lapwing.cli.options import Overrides, SceneFile
 from lapwing.cli.output_paths import check_distinct, claim, claim_named, claim_plot
+from lapwing.cli.preflight import with_solver_selected
 from lapwing.studies.tune.bandwidths import Bandwidths
 
 if TYPE_CHECKING:
@@ -86,7 +87,6 @@ def effects(
     from all of them, or added to all; path and end are the largest changes, energy and cost are those of all vehicles.
     """
     from lapwing.cli.progress import StudyProgress
-    from lapwing.services.scene_resolver import load
     from lapwing.studies.effects.procedure import study
     from lapwing.views.studies import effects_result
     from lapwing.views.studies.study_result import show, write_json, write_plot
@@ -111,7 +111,7 @@ def effects(
     screen = console()
 
     with StudyProgress(screen, "parts") as progress:
-        result = effects_result.result(study(load(scene, set_ or []), tolerance, progress.say, names))
+        result = effects_result.result(study(with_solver_selected(scene, set_ or []), tolerance, progress.say, names))
     if json:
         write_json(json, result)
     if plot:
@@ -229,7 +229,7 @@ def tune(
     """
     from lapwing.cli.progress import step_progress
     from lapwing.runs.observer import notify_on_compile
-    from lapwing.services.scene_resolver import load, resolve
+    from lapwing.services.scene_resolver import resolve
     from lapwing.studies.tune import gain_refinement, procedure
     from lapwing.views.studies import tune_result
     from lapwing.views.studies.study_result import show as show_result
@@ -240,7 +240,7 @@ def tune(
     claim_named("--out", out, ".toml")
     claim_named("--report", report, ".html")
     target, screen = Bandwidths(altitude, yaw, attitude, position), console()
-    loaded, numbers = load(scene, set_ or []), count(1)
+    loaded, numbers = with_solver_selected(scene, set_ or []), count(1)
     with step_progress(screen, "gain sets at most") as progress:
 
         def show(text: str, done: int = 0) -> None:

@@ -12,7 +12,7 @@ from rich.console import Console
 from lapwing.cosim.scene import Scene
 from lapwing.dynamics.config_error import ConfigError
 from lapwing.kernels import statistics
-from lapwing.services.plant.schema import Solver
+from lapwing.services.plant.schema import Solver, accuracy_to_select_for
 from lapwing.services.scene_resolver import load
 from lapwing.studies import json_file
 from lapwing.studies.accuracy import error_budget, round_off, scenes, solver_selection
@@ -79,9 +79,12 @@ def study(
 
     asked = goal or (scene and scene.each_vehicle[0][Solver].accuracy) or GOAL
     points = measure(problem, progress=say)
-    selected = None
-    with nullcontext() if goal else suppress(ConfigError):
+    selected, undecided = None, scene is not None and accuracy_to_select_for(scene) is not None
+    with nullcontext() if goal or undecided else suppress(ConfigError):
         selected = _of_flight(scene, overrides, asked, points, say) if scene else cheapest(points, asked)
+    if scene and selected and undecided:
+        solver = f'solver.integrator="{selected.method}"', f"solver.step={selected.setting!r}"
+        scene = load(scene.path, [*overrides, *solver])
     say("error sources of the flight", methods)
     parts = error_budget.errors(scene) if scene else []
     cost = costs(scene, [tables_of(scene)])[0][:2] if scene and error_budget.has_contact(scene) else None

@@ -34,12 +34,18 @@ def result(study: Study) -> StudyResult:
                 notes.append(f"largest change for {vehicle}: {', '.join(names)}")
     notes += [f"not flown: {row.remark}" for _, row in rows if row.remark]
     missing = ", ".join(row.name for row in study.missing) or "none"
+    verdict = f"smallest set of effects within {study.within:g} m: {', '.join(study.smallest) or 'none'}"
+    savings = [f"distance {study.distance:.2g} m; saves {hovering} of a step hovering, {standing} on the ground"]
+    studied = {row.name for active, row in rows if active and "." not in row.name}
+    if studied and studied <= set(study.smallest):
+        verdict = f"each studied effect of the scene is needed within {study.within:g} m: {', '.join(sorted(studied))}"
+        savings = []
     return StudyResult(
         study.scene,
-        f"smallest set of effects within {study.within:g} m: {', '.join(study.smallest) or 'none'}",
+        verdict,
         "",
         (
-            f"distance {study.distance:.2g} m; saves {hovering} of a step hovering, {standing} on the ground",
+            *savings,
             f"{absent.capitalize()}, influence above {study.within:g} m: {missing}",
             f"{steps}: {study.airborne:.0f} ns hovering, {study.standing:.0f} ns on the ground",
         ),

@@ -91,10 +91,9 @@
     document.querySelector("#add")?.addEventListener("change", async ({ target }) => {
       clearTimeout(timer);
       await preview(); // marks what was changed just now
-      const changed = all(".field.changed", form).map((field) => {
-        const input = field.querySelector("[name]");
-        return ["set", `${input.name}=${input.value}`];
-      });
+      const changed = all(".field.changed", form).map((field) => field.querySelector("[name]"))
+        .filter((input) => input.type !== "checkbox" || input.checked) // of an added effect: not switched off
+        .map((input) => ["set", `${input.name}=${input.value}`]);
       const added = all("input[name=add]", form).map((input) => ["add", input.value]);
       location = `?${new URLSearchParams([...changed, ...added, ["add", target.value]])}#${target.value}`;
     });

@@ -177,7 +177,7 @@ def test_scene_with_contact_has_error_sources_and_cost(capsys, monkeypatch):
         return problem._replace(methods=[m for m in problem.methods if m.name in ("rk4_renormalised", "rkmk4")])
 
     monkeypatch.setattr(accuracy_command.scenes, "problem", two_methods)
-    result = accuracy_command.study("hover", ["run.duration=0.2"], 1e-3)
+    result = accuracy_command.study("hover", ["run.duration=0.2", "solver={accuracy=1e-3}"], None)
     accuracy_command.show(console(120), result)
     assert result.selected[:4] == ("rk4_renormalised", 4, "s", 0.004)
     assert min(result.cost) > 0.0

@@ -235,7 +235,8 @@ def test_table_json_and_plot(tmp_path, capsys):
     assert "…" not in text  # no number is cut
     assert ["effect", "[ns]", "share", "[ns]", "[m]", "[m]", "energy"] in [line.split() for line in text.splitlines()]
     assert "ends early" in text
-    assert "  distance 0 m; saves nothing of a step hovering, nothing on the ground" in text.splitlines()
+    assert "each studied effect of the scene is needed within 0.01 m: gravity" in text.splitlines()[0]
+    assert "saves" not in text
     assert "25 %" in text  # 20 of 80 ns
     assert "< 1.5" in text  # cost of gravity, below the resolution of the measurement
     assert "not flown: gust.peak: field required" in text
