@@ -67,8 +67,7 @@ def check(
     from lapwing.services.common.schemas.run_schema import Run
     from lapwing.services.common.schemas.vehicle_schema import Vehicle
     from lapwing.services.scene_resolver import resolve
-    from lapwing.services.trajectory.service import NAME as TRAJECTORY
-    from lapwing.services.trajectory.service import TrajectoryConfig
+    from lapwing.services.trajectory.service import ordered_path
 
     with foreign_code.permission(allow_code):
         if json and not accuracy:
@@ -91,9 +90,8 @@ def check(
                 ("effects", ", ".join(sorted(each.tables("effects"))) or "none"),
                 ("sensors", ", ".join(sorted(each.tables("sensors"))) or "none"),
             ]
-            service = member.services.get(TRAJECTORY)
-            if service is not None and isinstance(service.parameters, TrajectoryConfig):
-                lines.append(("path", service.parameters.extent(member.duration)))
+            if trajectory := ordered_path(member):
+                lines.append(("path", trajectory.extent(member.duration)))
         lines.append(("services", f"{', '.join(config.order)}; {exchange.rate} Hz, {exchange.coupling}"))
         for label, line in lines:
             typer.echo(f"  {label:<9} {line}")

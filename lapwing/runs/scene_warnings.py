@@ -1,6 +1,5 @@
 """Parts of a scene that can be flown but hardly do what their author expects."""
 
-import re
 from collections.abc import Iterator
 from math import ceil
 
@@ -17,12 +16,11 @@ from lapwing.services.common.schemas.vehicle_schema import Effects, Vehicle, sta
 from lapwing.services.plant import models
 from lapwing.services.plant.schema import Solver, limited_by_round_off, method
 from lapwing.services.trajectory.schema import compile_trajectory
-from lapwing.services.trajectory.service import NAME, TrajectoryConfig
+from lapwing.services.trajectory.service import TrajectoryConfig, ordered_path
 
 MANY_PARTS = 8  # of a step, from which the cause is printed
 RIGID = ("rigid_body", "multibody")  # models of a multirotor without a load, which the wind moves by itself
 DEPTH = 0.01  # [m] below the surface, from which a place of a trajectory is in an obstacle
-DURATION = re.compile(r"run\.duration\s*=")
 
 
 def warnings(scene: Scene, config: RunConfig) -> Iterator[str]:
@@ -31,9 +29,8 @@ def warnings(scene: Scene, config: RunConfig) -> Iterator[str]:
         yield from _round_off(vehicle)
         yield from _split_steps(vehicle)
         yield from (f"{prefix(scene, vehicle)}{line}" for line in _wind(vehicle))
-        service = member.services.get(NAME)
-        if service is not None and isinstance(service.parameters, TrajectoryConfig):
-            yield from (f"{prefix(scene, vehicle)}{line}" for line in _trajectory(vehicle, member, service.parameters))
+        if trajectory := ordered_path(member):
+            yield from (f"{prefix(scene, vehicle)}{line}" for line in _trajectory(vehicle, member, trajectory))
 
 
 def prefix(scene: Scene, vehicle: Scene) -> str:
@@ -73,20 +70,25 @@ def _wind(vehicle: Scene) -> Iterator[str]:
 
 def _trajectory(vehicle: Scene, member: RunConfig, trajectory: TrajectoryConfig) -> Iterator[str]:
     """Yield a line for a trajectory longer than the run, outside of the fence, or through an obstacle."""
-    needed, shortened = compile_trajectory(vehicle).duration, any(map(DURATION.match, vehicle.overrides))  # on purpose
+    needed = compile_trajectory(vehicle).duration
+    shortened = any(each.key == "run.duration" for each in vehicle.file_overrides or ())  # on purpose
     if needed > member.duration and not shortened:
         yield f"run.duration: {member.duration:g} s end the run before its trajectory; use at least {ceil(needed)} s"
-    if vehicle.has(FenceTable):
+    terrain, fenced = environment(vehicle).terrain, vehicle.has(FenceTable)
+    if not fenced and isinstance(terrain, Level):
+        return
+    track = list(trajectory.track(member.duration))
+    if fenced:
         fence = Fence(vehicle[FenceTable].items())
-        for time, phase, x, y, _ in trajectory.track(member.duration):
+        for time, phase, x, y, _ in track:
             if breach := fence.breach(x, y):
                 yield f"{_place(time, phase, x, y)} is {breach}; move it or the fence"
                 break
-    if isinstance(terrain := environment(vehicle).terrain, Level):
+    if isinstance(terrain, Level):
         return
     x0, y0, z0 = start_place(vehicle)
     start, last = surface(terrain, x0, y0)[0], (x0, y0)
-    for time, phase, x, y, z in trajectory.track(member.duration):
+    for time, phase, x, y, z in track:
         sideways, last = (x, y) != last, (x, y)  # a descent may end on an obstacle
         if sideways and (height := surface(terrain, x, y)[0] - start) > z - z0 + DEPTH:
             yield f"{_place(time, phase, x, y)} is inside an obstacle {height:.1f} m high, at {z - z0:.1f} m"

@@ -58,6 +58,13 @@ class TrajectoryConfig(NamedTuple):
         return f"{number} phase{'s' * (number > 1)}, {places[-1][0]:.0f} s, {length:.0f} m"
 
 
+def ordered_path(member: RunConfig) -> TrajectoryConfig | None:
+    """Return the trajectory of a vehicle, given its run configuration alone; None if the scene orders no path."""
+    service = member.services.get(NAME)
+    parameters = service.parameters if service is not None else None
+    return parameters if isinstance(parameters, TrajectoryConfig) else None
+
+
 def _place(path: Parameters, time: float) -> tuple[float, float, float]:
     x, y, z = path.origin_world
     return x + _channel_at(path.x, time)[0], y + _channel_at(path.y, time)[0], z + _channel_at(path.z, time)[0]

@@ -65,10 +65,10 @@ def phases(route: Route) -> list[dict[str, Any]]:
     path = [(0.0, 0.0, climb), *points]
     if dist(path[0], path[1]) < SHORTEST:
         del path[0]
-    result = [_phase("take-off", {"z": [_through(climb, PEAK * climb / slow)]})] if climb > 0.0 else []
+    result = [{"name": "take-off", "z": [_through(climb, PEAK * climb / slow)]}] if climb > 0.0 else []
     first = len(points) - len(path) + 2
     if first == 2 and turns[0]:  # the first point is above the start
-        result.append(_phase("turn", {"yaw": [_through(turns[0].end, PEAK * abs(turns[0].change) / YAW_RATE)]}))
+        result.append({"name": "turn", "yaw": [_through(turns[0].end, PEAK * abs(turns[0].change) / YAW_RATE)]})
     for number, (a, b) in enumerate(pairwise(path), start=first):
         if dist(a, b) < SHORTEST:
             raise ConfigError(f"waypoints.{number - 1}", f"got {list(b)} like the point before", "another point")
@@ -83,10 +83,10 @@ def phases(route: Route) -> list[dict[str, Any]]:
         }
         if turn:
             channels["yaw"] = [_through(turn.end, math.total(duration for _, duration, *_ in parts))]
-        result.append(_phase(f"waypoint {number}", channels))
+        result.append({"name": f"waypoint {number}", **channels})
     end = points[-1][2]
     if route.land and end > 0.0:
-        result.append(_phase("landing", {"z": [_through(0.0, PEAK * end / slow)]}))
+        result.append({"name": "landing", "z": [_through(0.0, PEAK * end / slow)]})
     return [*result, {"name": "rest" if route.land else "hover", "duration": REST}]
 
 
@@ -124,10 +124,6 @@ def _parts(a: Point, b: Point, u: Point, v: Point, speed: float) -> list[tuple[P
     paces = [0.5 * (speed + math.total(p * q for p, q in zip(end, along, strict=True))) for end in (u, v)]  # along it
     middle = [(last, (length - 2.0 * reach) / speed, cruise, cruise)] if 2.0 * reach < length else []
     return [(first, reach / paces[0], u, cruise), *middle, (b, reach / paces[1], cruise, v)]
-
-
-def _phase(name: str, channels: dict[str, list[dict[str, Any]]]) -> dict[str, Any]:
-    return {"name": name, **channels}
 
 
 def _through(to: float, duration: float, first: float = 0.0, last: float = 0.0) -> dict[str, Any]:

@@ -156,6 +156,6 @@ def test_click_on_event_moves_plots(tmp_path):
     assert re.search(r'data-time="2.0"', page.read_text(encoding="utf-8"))
 
 
-def test_published_values_stand_beside_the_errors_of_their_airframe_only():
+def test_published_errors_are_shown_for_their_airframe_only():
     assert published_figures(load("delivery_mission").resolved)["source"] == "paper, Table 7"
     assert not published_figures(load("delivery_mission", ["vehicle.airframe=racer_250"]).resolved)

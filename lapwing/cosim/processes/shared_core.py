@@ -168,7 +168,7 @@ class SharedCore:
             self._claim, self._core = claim, claim.core
         self._pid, self._next = pid, time.monotonic() + PERIOD
         self._measure()
-        self._started, self._in_turns = set(started), len(started) == 1
+        self._started = set(started)
         self._move_program(self._started)
 
     def update(self) -> None:
@@ -184,7 +184,7 @@ class SharedCore:
             self._forget()
             return
         (self._core,) = present  # the owner of the claim, another vehicle of this thread, may have moved
-        if self._claim and not self._in_turns:
+        if self._claim and len(self._started) > 1:  # while a program in turns moved, its messages could change order
             self._relocate()
         self._move_program(self._started, before)
 

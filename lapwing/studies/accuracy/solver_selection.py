@@ -51,11 +51,14 @@ def overrides(scene: Scene, notify: Callable[[str], None]) -> list[str]:
     accuracy = accuracy_to_select_for(scene)
     if accuracy is None:
         return []
-    method, step = select(scene, accuracy, notify)
-    # exact step that `Solver.check` accepts as a divisor of the communication step
-    chosen = [f'solver.integrator="{method}"', f"solver.step={step!r}"]
+    chosen = as_overrides(*select(scene, accuracy, notify))
     _warn_of_neighbours(scene, chosen, accuracy, notify)
     return chosen
+
+
+def as_overrides(method: str, step: float) -> list[str]:
+    """Return overrides with the exact step [s], which `Solver.check` accepts as a divisor of the communication step."""
+    return [f'solver.integrator="{method}"', f"solver.step={step!r}"]
 
 
 def select(scene: Scene, accuracy: float, notify: Callable[[str], None]) -> tuple[str, float]:

@@ -83,8 +83,7 @@ def study(
     with nullcontext() if goal or undecided else suppress(ConfigError):
         selected = _of_flight(scene, overrides, asked, points, say) if scene else cheapest(points, asked)
     if scene and selected and undecided:
-        solver = f'solver.integrator="{selected.method}"', f"solver.step={selected.setting!r}"
-        scene = load(scene.path, [*overrides, *solver])
+        scene = load(scene.path, [*overrides, *solver_selection.as_overrides(selected.method, selected.setting)])
     say("error sources of the flight", methods)
     parts = error_budget.errors(scene) if scene else []
     cost = costs(scene, [tables_of(scene)])[0][:2] if scene and error_budget.has_contact(scene) else None

@@ -174,11 +174,9 @@ class Pages:
         """Return the command line, the Python code and the faults of a posted form as JSON."""
         name, posted, added = await posted_form(request)
         changed, faults, error = await run_in_threadpool(form_changes, name, posted, added)
-        paths, warnings = (
-            ([], [])
-            if faults or error
-            else await run_in_threadpool(lambda: paths_and_warnings(load_named(name, changed)))
-        )
+        sound = not (faults or error)
+        found = await run_in_threadpool(lambda: paths_and_warnings(load_named(name, changed))) if sound else None
+        paths, warnings = found or ([], [])
         command = command_line(name, changed, posted.get("speed", ""), posted.get("view") == "yes")
         texts = {"command": shlex.join(command), "python": python(name, changed), "toml": toml_text(name, changed)}
         keys = [change.key for change in changed]

@@ -21,8 +21,7 @@ from lapwing.file_schemas.json_schema import scene_schema
 from lapwing.runs.scene_warnings import warnings
 from lapwing.services.common.schemas.run_schema import SHIPPED
 from lapwing.services.scene_resolver import load, resolve
-from lapwing.services.trajectory.service import NAME as TRAJECTORY
-from lapwing.services.trajectory.service import TrajectoryConfig
+from lapwing.services.trajectory.service import ordered_path
 from lapwing.views.studio.form_fields import EXTENSIBLE, Field, form, starting_values
 
 OFF, SWITCHED = "false", tuple(f"{name}." for name in EXTENSIBLE)  # value that switches an effect or sensor off
@@ -185,9 +184,8 @@ def paths_and_warnings(scene: Scene) -> tuple[list[list[tuple[float, ...]]], lis
     """Return the path that the trajectory of each vehicle orders, places [m], world; and the warnings of the scene."""
     result, config = [], resolve(scene)
     for member in members(config):
-        service = member.services.get(TRAJECTORY)
-        if service is not None and isinstance(service.parameters, TrajectoryConfig):
-            places = (place for _, _, *place in service.parameters.track(member.duration, MOST_PLACES))
+        if trajectory := ordered_path(member):
+            places = (place for _, _, *place in trajectory.track(member.duration, MOST_PLACES))
             result.append([tuple(round(value, 2) for value in place) for place in places])
     return result, list(warnings(scene, config))
 

@@ -51,7 +51,7 @@ ALONE = ["axial_inflow", "body_drag", "dynamic_inflow", "gravity", "ground_effec
 
 @pytest.mark.usefixtures("uncompiled")
 @pytest.mark.parametrize("name", ALONE)
-def test_uses_wind_is_true_for_effects_whose_acceleration_changes_in_wind(drone, name):
+def test_effect_uses_wind_if_it_changes_an_acceleration(drone, name):
     accelerations = []
     for velocity in ((0.0, 0.0, 0.0), (4.0, -2.0, 1.0)):
         tables = {"rotor_thrust": {}, name: {}, "wind_constant": {"velocity": velocity}}
